@@ -1,0 +1,141 @@
+"""Pinhole cameras and calibrated stereo rigs.
+
+The functions take NumPy arrays or torch tensors alike, with any leading batch dimensions.
+"""
+
+from dataclasses import dataclass
+from math import cos, pi, sin, tan
+from typing import TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from stereo_occ.errors import UserError
+
+Array = TypeVar("Array", NDArray[np.floating], torch.Tensor)
+
+
+def transform_points(points_N3: Array, target_from_source_44: Array) -> Array:
+    """Apply a 4x4 affine transform to row-vector points ``(..., N, 3)``."""
+    return points_N3 @ target_from_source_44[..., :3, :3].mT + target_from_source_44[..., None, :3, 3]
+
+
+def project(points_N3: Array, K_33: Array, camera_from_rig_44: Array) -> tuple[Array, Array]:
+    """Project rig-frame points to pixels.
+
+    Returns:
+        Pixels ``(..., N, 2)`` and depths along the optical axis ``(..., N)`` in metres. Points at or behind the
+        optical centre have depth <= 0 and meaningless pixels.
+    """
+    camera_N3 = transform_points(points_N3, camera_from_rig_44)
+    homogeneous_N3 = camera_N3 @ K_33.mT
+    return homogeneous_N3[..., :2] / homogeneous_N3[..., 2:], camera_N3[..., 2]
+
+
+def normalize_pixels(pixels_N2: Array, width: int, height: int) -> Array:
+    """Pixels to the [-1, 1] coordinates of ``grid_sample(align_corners=False)``.
+
+    -1 and 1 are the outer edges of the image, so the same coordinates address feature maps of any stride.
+    """
+    if isinstance(pixels_N2, torch.Tensor):
+        return (2 * pixels_N2 + 1) / pixels_N2.new_tensor([width, height]) - 1
+    return (2 * pixels_N2 + 1) / np.array([width, height]) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole camera: intrinsics ``K`` (3x3, pixels), ``camera_from_rig`` (4x4, metres), image size in pixels."""
+
+    K: NDArray[np.float64]
+    camera_from_rig: NDArray[np.float64]
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        check_rigid(self.camera_from_rig, "camera_from_rig")
+        if not (self.K[0, 0] > 0 and self.K[1, 1] > 0 and np.isfinite(self.K).all()):
+            raise UserError(f"K: focal lengths must be positive and finite, got {self.K.tolist()}")
+
+    def project(self, points_N3: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rig-frame points ``(N, 3)`` to pixels ``(N, 2)`` and depths ``(N,)``; see :func:`project`."""
+        return project(points_N3, self.K, self.camera_from_rig)
+
+    def unproject(
+        self, pixels_N2: NDArray[np.float64], depth_N: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Pixels ``(N, 2)`` at depths ``(N,)`` metres to rig-frame points ``(N, 3)``; inverse of :meth:`project`."""
+        homogeneous_N3 = np.concatenate([pixels_N2, np.ones_like(pixels_N2[..., :1])], axis=-1)
+        camera_N3 = homogeneous_N3 @ np.linalg.inv(self.K).T * depth_N[..., None]
+        return transform_points(camera_N3, np.linalg.inv(self.camera_from_rig))
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """Optical centre in the rig frame, ``(3,)`` metres."""
+        rotation, translation = self.camera_from_rig[:3, :3], self.camera_from_rig[:3, 3]
+        return -rotation.T @ translation
+
+
+@dataclass(frozen=True, eq=False)
+class StereoRig:
+    """A left and a right camera in one rig frame."""
+
+    left: Camera
+    right: Camera
+
+    @property
+    def cameras(self) -> tuple[Camera, Camera]:
+        """Left, right."""
+        return self.left, self.right
+
+    @property
+    def baseline(self) -> float:
+        """Distance between the optical centres in metres."""
+        return float(np.linalg.norm(self.left.center - self.right.center))
+
+
+def toed_in_rig(distance: float, half_angle: float, fov: float, side: int) -> StereoRig:
+    """Two cameras on a circle about the fixation point, looking at it: the paper's Figure 4.
+
+    Args:
+        distance: from each camera to the fixation point, metres (the paper: 1).
+        half_angle: angle of each camera from the mid-line about +Y, radians (the paper: pi/16); left is at -half_angle.
+        fov: vertical field of view, radians (pi/3).
+        side: image side in pixels; images are square.
+    """
+    for name, value, upper in (("distance", distance, np.inf), ("half_angle", half_angle, pi / 2), ("fov", fov, pi)):
+        if not 0 < value < upper:
+            raise UserError(f"rig.{name}: must lie in (0, {upper:.4g}), got {value}")
+    K = intrinsics(fov, side)
+    return StereoRig(*(Camera(K, look_at_origin(angle, distance), side, side) for angle in (-half_angle, half_angle)))
+
+
+def intrinsics(fov: float, side: int) -> NDArray[np.float64]:
+    """Intrinsics (3x3) of a centred square camera with field of view ``fov`` radians and ``side`` pixels."""
+    focal, principal = side / 2 / tan(fov / 2), (side - 1) / 2
+    return np.array([[focal, 0, principal], [0, focal, principal], [0, 0, 1]], dtype=np.float64)
+
+
+def look_at_origin(angle: float, distance: float) -> NDArray[np.float64]:
+    """``camera_from_rig`` (4x4) of a camera at ``distance`` metres, ``angle`` radians from +Z about +Y, upright."""
+    c, s = cos(angle), sin(angle)
+    return np.array(
+        [
+            [c, 0, -s, 0],  # camera +X: right
+            [0, -1, 0, 0],  # camera +Y: down
+            [-s, 0, -c, distance],  # camera +Z: from the camera to the origin
+            [0, 0, 0, 1],
+        ]
+    )
+
+
+def check_rigid(matrix_44: NDArray[np.float64], name: str) -> None:
+    """Raise :class:`UserError` unless the 4x4 matrix is a rotation and a translation, to 1e-5."""
+    rotation = matrix_44[:3, :3]
+    if matrix_44.shape != (4, 4) or not np.isfinite(matrix_44).all():
+        raise UserError(f"{name}: must be a finite 4x4 matrix, got shape {matrix_44.shape}: {matrix_44.tolist()}")
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-5) or np.linalg.det(rotation) < 0:
+        raise UserError(
+            f"{name}: the upper left 3x3 block must be a rotation (orthonormal, determinant +1), "
+            f"got {rotation.tolist()}"
+        )

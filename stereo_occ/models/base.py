@@ -1,0 +1,44 @@
+"""What every model takes and gives."""
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+
+@dataclass(frozen=True)
+class StereoViews:
+    """A batch of calibrated pairs.
+
+    Attributes:
+        left_BCHW, right_BCHW: RGB in [0, 1].
+        K_B233: intrinsics of the left and the right camera, pixels.
+        camera_from_rig_B244: extrinsics of the left and the right camera, metres.
+    """
+
+    left_BCHW: Tensor
+    right_BCHW: Tensor
+    K_B233: Tensor
+    camera_from_rig_B244: Tensor
+
+
+class OccupancyModel(nn.Module):
+    """An occupancy function conditioned on a stereo pair.
+
+    ``encode`` looks at the images once; ``decode`` answers for any number of rig-frame points. In eval mode the answer
+    for a point does not depend on which other points are asked.
+    """
+
+    @abstractmethod
+    def encode(self, views: StereoViews) -> Any:
+        """The conditioning code of each pair, in whatever form :meth:`decode` takes."""
+
+    @abstractmethod
+    def decode(self, code: Any, points_BN3: Tensor) -> Tensor:
+        """Occupancy logits ``(B, N)`` of rig-frame points."""
+
+    def forward(self, views: StereoViews, points_BN3: Tensor) -> Tensor:
+        """Occupancy logits ``(B, N)``."""
+        return torch.as_tensor(self.decode(self.encode(views), points_BN3))

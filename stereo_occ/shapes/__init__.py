@@ -1,0 +1,1 @@
+"""Objects: watertight meshes in the object frame, procedural or from files."""
