@@ -1,0 +1,95 @@
+"""Query points of one view, in the rig frame, from an object's point pools and its pose there."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereo_occ.errors import UserError
+from stereo_occ.geometry.pose import Pose
+from stereo_occ.occupancy.pools import PointPool, lattice_points
+
+_HALF = 0.5  # the working volume is the cube [-0.5, 0.5]^3 of the rig frame
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledPoints:
+    """Points ``(N, 3)`` and whether the object contains them ``(N,)``."""
+
+    points_N3: NDArray[np.floating]
+    occupied_N: NDArray[np.bool_]
+
+
+def bbox_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
+    """``count`` distinct points of a box pool, posed: the paper's query points.
+
+    Raises:
+        UserError: if the pool has fewer points.
+    """
+    return _draw(pool, pose, count, rng)
+
+
+def surface_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
+    """``count`` distinct points of a surface pool, posed.
+
+    Raises:
+        UserError: if the pool has fewer points.
+    """
+    return _draw(pool, pose, count, rng)
+
+
+def cube_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
+    """``count`` points uniform in the working volume, with the labels of a box pool.
+
+    Outside the object's posed box a point is empty. Points inside it are replaced by as many distinct points
+    of the pool, posed: they too are uniform in the box, and their labels are known.
+
+    Raises:
+        UserError: if the pool has too few points, or the posed box leaves the working volume.
+    """
+    points_N3 = rng.uniform(-_HALF, _HALF, (count, 3))
+    inside_N = _in_box(points_N3, pool, pose)
+    drawn = _draw(pool, pose, int(inside_N.sum()), rng)
+    points_N3[inside_N] = drawn.points_N3
+    occupied_N = np.zeros(count, dtype=bool)
+    occupied_N[inside_N] = drawn.occupied_N
+    return LabelledPoints(points_N3, occupied_N)
+
+
+def outside_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
+    """``count`` points uniform in the working volume without the box of a box pool, posed: all empty.
+
+    Raises:
+        UserError: if the posed box leaves the working volume.
+    """
+    points_N3 = np.empty((0, 3))
+    while len(points_N3) < count:  # a box with diagonal 1 fills at most a fifth of the cube
+        candidates_M3 = rng.uniform(-_HALF, _HALF, (count, 3))
+        points_N3 = np.concatenate([points_N3, candidates_M3[~_in_box(candidates_M3, pool, pose)]])
+    return LabelledPoints(points_N3[:count], np.zeros(count, dtype=bool))
+
+
+def _draw(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
+    """``count`` distinct points of the pool, posed."""
+    if count > len(pool):
+        raise UserError(
+            f"query points: {count} asked from a pool of {len(pool)}; ask for fewer or prepare a larger pool"
+        )
+    index_M = rng.choice(len(pool), count, replace=False)
+    points_M3 = lattice_points(pool.grid_N3[index_M], pool.low_3, pool.extent_3)
+    return LabelledPoints(pose.to_rig(points_M3), pool.occupied_N[index_M])
+
+
+def _in_box(points_N3: NDArray[np.float64], pool: PointPool, pose: Pose) -> NDArray[np.bool_]:
+    """Which rig-frame points lie in the pool's posed box; refuses a box that leaves the working volume."""
+    high_3 = pool.low_3 + pool.extent_3
+    corners_83 = pose.to_rig(np.array(list(product(*zip(pool.low_3, high_3, strict=True)))))
+    reach = float(np.abs(corners_83).max())
+    if reach > _HALF + 1e-6:
+        raise UserError(
+            f"pose: the object's box reaches {reach:.4f} m from the fixation point along an axis, "
+            f"beyond the cube of +-{_HALF} m; lower the scale ({pose.scale:.4f}) or move the centre"
+        )
+    object_N3 = pose.to_object(points_N3)
+    return np.asarray(((object_N3 > pool.low_3) & (object_N3 < high_3)).all(axis=1))
