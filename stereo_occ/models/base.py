@@ -27,8 +27,8 @@ class StereoViews:
 class OccupancyModel(nn.Module):
     """An occupancy function conditioned on a stereo pair.
 
-    ``encode`` looks at the images once; ``decode`` answers for any number of rig-frame points. In eval mode the answer
-    for a point does not depend on which other points are asked.
+    ``encode`` looks at the images once; ``decode`` answers for any number of rig-frame points. In eval mode
+    the answer for a point does not depend on which other points are asked.
     """
 
     @abstractmethod

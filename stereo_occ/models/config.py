@@ -1,0 +1,129 @@
+"""Schemas of the models: every setting, its type and its meaning. The values are in ``conf/model/``."""
+
+from dataclasses import dataclass
+
+from hydra.core.config_store import ConfigStore
+from omegaconf import MISSING
+
+
+@dataclass
+class EncoderConfig:
+    """An image encoder."""
+
+    name: str = MISSING
+
+
+@dataclass
+class DilatedResNetConfig(EncoderConfig):
+    """Dilated ResNet with three stages at strides 4, 8 and 16."""
+
+    name: str = "dilated_resnet"
+    channels: int = MISSING  # of the features merged back to stride 4
+    widths: list[int] = MISSING  # channels of each stage
+    blocks: list[int] = MISSING  # residual blocks of each stage
+    dilations: list[int] = MISSING  # of the last stage's blocks, repeated
+
+
+@dataclass
+class ResNet18Config(EncoderConfig):
+    """torchvision's ResNet-18."""
+
+    name: str = "resnet18"
+    weights: str | None = MISSING  # IMAGENET1K_V1, or null to start from scratch
+
+
+@dataclass
+class CostVolumeConfig:
+    """A cost volume."""
+
+    name: str = MISSING
+
+
+@dataclass
+class CorrelationConfig(CostVolumeConfig):
+    """Channel-wise products."""
+
+    name: str = "correlation"
+    disparities: int | None = (
+        MISSING  # feature cells 0 .. disparities - 1; null: what the rig's calibration allows
+    )
+
+
+@dataclass
+class SignedCorrelationConfig(CostVolumeConfig):
+    """Channel-wise products over the disparities that the rig's calibration allows."""
+
+    name: str = "correlation_signed"
+
+
+@dataclass
+class GroupwiseConfig(CostVolumeConfig):
+    """Products averaged over groups of channels."""
+
+    name: str = "groupwise"
+    disparities: int | None = MISSING  # as for correlation
+    groups: int = MISSING
+
+
+@dataclass
+class ConcatConfig(CostVolumeConfig):
+    """Left features beside shifted right features."""
+
+    name: str = "concat"
+    disparities: int | None = MISSING  # as for correlation
+
+
+@dataclass
+class DecoderConfig:
+    """An occupancy decoder."""
+
+    name: str = MISSING
+
+
+@dataclass
+class ONetConfig(DecoderConfig):
+    """Residual blocks with conditional batch norm."""
+
+    name: str = "onet"
+    hidden: int = MISSING
+    blocks: int = MISSING
+
+
+@dataclass
+class StereoConfig:
+    """Cost volume of both images."""
+
+    name: str = "stereo"
+    feature_stride: int = MISSING  # of the matched features, in image pixels
+    width: int = (
+        MISSING  # channels at the end of the 2D blocks that summarise the cost volume; they begin with 4 x
+    )
+    code_size: int = MISSING
+    encoder: EncoderConfig = MISSING
+    cost_volume: CostVolumeConfig = MISSING
+    decoder: DecoderConfig = MISSING
+
+
+@dataclass
+class MonoConfig:
+    """Left image only."""
+
+    name: str = "mono"
+    code_size: int = MISSING
+    encoder: EncoderConfig = MISSING
+    decoder: DecoderConfig = MISSING
+
+
+SCHEMAS: dict[str, tuple[type, ...]] = {
+    "model": (StereoConfig, MonoConfig),
+    "model/encoder": (DilatedResNetConfig, ResNet18Config),
+    "model/cost_volume": (CorrelationConfig, SignedCorrelationConfig, GroupwiseConfig, ConcatConfig),
+    "model/decoder": (ONetConfig,),
+}
+
+
+def register_schemas(store: ConfigStore) -> None:
+    """Store each schema as ``base_<name>`` in its group; the YAML file of that name lists it first."""
+    for group, schemas in SCHEMAS.items():
+        for schema in schemas:
+            store.store(group=group, name=f"base_{schema().name}", node=schema)

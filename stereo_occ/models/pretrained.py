@@ -1,0 +1,39 @@
+"""ImageNet weights through torchvision's own interface."""
+
+from pathlib import Path
+from typing import Any
+
+import torch
+from torchvision.models import ResNet18_Weights
+
+from stereo_occ.errors import UserError
+
+
+def named_weights(name: str) -> ResNet18_Weights:
+    """torchvision's ResNet-18 weights of that name.
+
+    Raises:
+        UserError: if there are none.
+    """
+    if name not in ResNet18_Weights.__members__:
+        raise UserError(
+            f"model.encoder.weights: unknown {name!r}; use {' or '.join(ResNet18_Weights.__members__)}, "
+            "or null to train from scratch"
+        )
+    return ResNet18_Weights[name]
+
+
+def fetch(weights: ResNet18_Weights) -> dict[str, Any]:
+    """The state dict, from torch's cache or else from the network.
+
+    Raises:
+        UserError: if it is in neither.
+    """
+    cached = Path(torch.hub.get_dir()) / "checkpoints" / weights.url.rsplit("/", 1)[-1]
+    try:
+        return dict(weights.get_state_dict(progress=False, check_hash=True, weights_only=True))
+    except (OSError, RuntimeError) as error:
+        raise UserError(
+            f"model.encoder.weights: {weights.name} is not at {cached} and cannot be fetched ({error}); "
+            "put the file there, or train from scratch with model.encoder.weights=null"
+        ) from error
