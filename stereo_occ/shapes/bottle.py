@@ -1,26 +1,169 @@
-"""Procedural bottles. The radius of the body is about 1."""
+"""Procedural bottles: a lathed or sectioned body with a neck, a closure and sometimes a handle; mostly solid."""
+
+from dataclasses import dataclass
 
 import numpy as np
+from manifold3d import CrossSection, Manifold
 from numpy.random import Generator
 
-from stereo_occ.shapes import solids
+from stereo_occ.shapes import bottle_tops, solids
+from stereo_occ.shapes.bottle_profiles import Silhouette, silhouette
+from stereo_occ.shapes.curves import Points
+from stereo_occ.shapes.handle import HANDLES, SECTIONS, Handle, handle_tube
 from stereo_occ.shapes.shape import Shape
+from stereo_occ.shapes.vessel import OPEN, Vessel, wall_fraction
 
-KINDS = ("wine", "soda", "flask", "jar", "jug", "spray")
+KIND_ODDS = {
+    "wine": 0.24,
+    "soda": 0.19,
+    "flask": 0.13,
+    "jar": 0.12,
+    "jug": 0.12,
+    "spray": 0.1,
+    "squeeze": 0.1,
+}
+
+CLOSURES: dict[str, dict[str, float]] = {
+    "wine": {"lip": 0.65, "cap": 0.2, "plain": 0.15},
+    "soda": {"cap": 0.55, "lip": 0.3, "plain": 0.15},
+    "flask": {"cap": 0.6, "lip": 0.2, "plain": 0.2},
+    "jar": {"cap": 0.75, "lip": 0.15, "plain": 0.1},
+    "jug": {"cap": 0.7, "lip": 0.2, "plain": 0.1},
+    "spray": {"spray head": 0.45, "pump": 0.3, "plain": 0.25},
+    "squeeze": {"nozzle": 0.8, "cap": 0.2},
+}
+
+#: Odds of a round, an oval and a rounded rectangular section.
+SECTION_ODDS = {
+    "wine": (0.92, 0.0, 0.08),
+    "soda": (0.88, 0.0, 0.12),
+    "flask": (0.0, 0.45, 0.55),
+    "jar": (0.75, 0.0, 0.25),
+    "jug": (0.35, 0.2, 0.45),
+    "spray": (0.35, 0.3, 0.35),
+    "squeeze": (0.45, 0.4, 0.15),
+}
+
+
+@dataclass(frozen=True)
+class Section:
+    """The horizontal section of the body: a superellipse that turns round between shoulder and neck."""
+
+    name: str
+    exponent: float
+    aspect: float
+    facets: int
+
+    def turned(self, section: CrossSection, outline: Silhouette) -> Manifold:
+        """The solid with a lathe section."""
+        solid = solids.lathe(section, self.facets or 48)
+        if self.exponent == 2 and self.aspect == 1:
+            return solid
+
+        def weight(height: Points) -> Points:
+            t = np.clip((outline.neck - height) / (outline.neck - 0.8 * outline.shoulder), 0, 1)
+            return t * t * (3 - 2 * t)
+
+        return solids.with_section(solid, self.exponent, self.aspect, weight)
 
 
 def bottle(rng: Generator, object_id: str) -> Shape:
     """A random bottle, not yet in the object frame."""
-    kind = str(rng.choice(KINDS))
-    body, shoulder, neck = rng.uniform(2, 4), rng.uniform(0.4, 1.2), rng.uniform(0.5, 2)
-    r = rng.uniform(0.25, 0.5)
-    profile_N2 = np.array([[1, 0], [1, body], [r, body + shoulder], [r, body + shoulder + neck]])
-    section = solids.rounded(solids.section_of(profile_N2), outward=rng.uniform(0.05, 0.2), inward=0.3)
-    solid = solids.lathe(section)
+    kind = str(rng.choice(list(KIND_ODDS), p=list(KIND_ODDS.values())))
+    outline = silhouette(rng, kind)
+    section = _section(rng, kind)
+    closure = str(rng.choice(list(CLOSURES[kind]), p=list(CLOSURES[kind].values())))
+    hollow = rng.random() < 0.22
+    thickness = float(np.clip(wall_fraction(rng), 0.0125, 0.4 * outline.neck_radius)) if hollow else 0.0
+    body = _body(rng, outline, closure, thickness)
+    solid = section.turned(body.wall, outline)
+    if closure in bottle_tops.HEADS:
+        solid += bottle_tops.HEADS[closure](rng, outline.neck_radius)
+    parts, handle = {}, "none"
+    if kind == "jug" and rng.random() < 0.75:
+        handle = str(rng.choice(("grip", *HANDLES))) if not hollow else str(rng.choice(HANDLES))
+        hull = section.turned(body.hull, outline)
+        if handle == "grip":
+            hole, around = _grip(rng, outline)
+            solid, handle_solid = solid - hole, hull ^ around
+        else:
+            tube = _handle_tube(rng, handle, outline, thickness)
+            solid, handle_solid = solid + (tube - section.turned(body.middle, outline)), tube - hull
+        parts["handle"] = solids.trimesh_of(handle_solid)
+    if kind == "squeeze" and rng.random() < 0.2:
+        solid = solids.leaning(solid, rng.uniform(0.9, 1.0) * outline.shoulder, rng.uniform(0.6, 2.0))
+    parts["neck"] = solids.trimesh_of(solids.slab(solid, outline.neck, 1.0))
+    parts["floor"] = solids.trimesh_of(solids.slab(solid, -1.0, body.floor))
     mesh = solids.trimesh_of(solid)
-    parts = {
-        "neck": solids.trimesh_of(solids.slab(solid, body + shoulder, 99)),
-        "floor": solids.trimesh_of(solids.slab(solid, -1, 0.15)),
+    facts: dict[str, str | float | bool] = {
+        "kind": kind,
+        "handle": handle,
+        "section": section.name,
+        "closure": closure,
+        "hollow": hollow,
     }
-    facts: dict[str, str | float | bool] = {"kind": kind, "section": "round", "hollow": False}
+    if hollow:
+        facts["wall_thickness"] = thickness / float(mesh.extents.max())
     return Shape("bottle", object_id, mesh, parts, facts)
+
+
+def _body(rng: Generator, outline: Silhouette, closure: str, thickness: float) -> Vessel:
+    """The lathe sections of the body with its cap or lip; solid where the wall thickness is 0."""
+    beyond = [[outline.neck_radius, OPEN]]
+    tall = solids.section_of(np.concatenate([outline.profile_N2, beyond]))
+    tall = solids.rounded(
+        tall, outward=min(rng.uniform(0.1, 0.5) * outline.radius, 0.9 * outline.neck_radius)
+    )
+    hull = tall ^ solids.rectangle((0, OPEN), (-1, 1))
+    top = bottle_tops.TOPS.get(closure)
+    if top is not None:
+        hull += top(rng, outline.neck_radius)
+    punt = rng.uniform(0.004, 0.03) if rng.random() < 0.6 else 0.0
+    if punt:
+        hull -= solids.bead(0.0, 0.0, (0.75 * outline.profile_N2[0, 0], punt))
+    hull = solids.rounded(hull, outward=rng.uniform(0.003, 0.01), inward=rng.uniform(0.003, 0.015))
+    if not thickness:
+        return Vessel(hull, hull, solids.offset(tall, -0.01), 0.05)
+    floor = punt + thickness * rng.uniform(1.0, 1.8)
+    ceiling = OPEN if closure in ("lip", "plain") else 0.965
+    cavity = solids.offset(tall, -thickness) ^ solids.rectangle((0, OPEN), (floor, ceiling))
+    wall = hull - solids.rounded(cavity, outward=0.2 * thickness)
+    wall = solids.rounded(wall, outward=0.35 * thickness)
+    return Vessel(wall, hull, solids.offset(tall, -thickness / 2), floor)
+
+
+def _section(rng: Generator, kind: str) -> Section:
+    shape = str(rng.choice(("round", "oval", "rounded rectangle"), p=SECTION_ODDS[kind]))
+    if shape == "oval":
+        return Section(shape, rng.uniform(2.0, 2.6), rng.uniform(0.5, 0.85), 0)
+    if shape == "rounded rectangle":
+        flat = rng.uniform(0.4, 0.75) if kind == "flask" else rng.uniform(0.55, 1.0)
+        return Section(shape, rng.uniform(3.5, 9.0), flat, 0)
+    facets = int(rng.choice((6, 8, 10, 12))) if rng.random() < 0.06 else 0
+    return Section(f"{facets} facets" if facets else shape, 2.0, 1.0, facets)
+
+
+def _handle_tube(rng: Generator, kind: str, outline: Silhouette, thickness: float) -> Manifold:
+    """The handle of a jug, from its neck or shoulder to its side."""
+    top = outline.shoulder + rng.uniform(0.4, 1.2) * (outline.neck - outline.shoulder)
+    bottom = outline.shoulder * rng.uniform(0.45, 0.8)
+    size = rng.uniform(0.05, 0.085)
+    handle = Handle(kind, str(rng.choice(SECTIONS)), min(top, 0.9), bottom, rng.uniform(0.06, 0.14), size)
+    return handle_tube(
+        rng, handle, outline.profile_N2, depth=thickness + min(size, 0.8 * outline.neck_radius)
+    )
+
+
+def _grip(rng: Generator, outline: Silhouette) -> tuple[Manifold, Manifold]:
+    """A hole through the body that leaves a strip to hold, and the region of that strip."""
+    strip = rng.uniform(0.045, 0.07)
+    low = outline.shoulder * rng.uniform(0.55, 0.75)
+    high = outline.shoulder + rng.uniform(0.2, 0.6) * (outline.neck - outline.shoulder)
+    inner = rng.uniform(0.3, 0.5) * outline.radius
+    within = solids.offset(solids.section_of(outline.profile_N2), -strip)
+    opening = within ^ CrossSection([np.array([[inner, low], [1, low], [1, high], [inner, high]])])
+    opening = solids.rounded(opening, outward=0.02)
+    hole = opening.extrude(2.0).translate((0, 0, -1.0)).rotate((90, 0, 0))
+    middle = (opening.bounds()[0] + opening.bounds()[2]) / 2
+    around = Manifold.cube((1.0, 2.0, high - low)).translate((middle, -1.0, low))
+    return hole, around

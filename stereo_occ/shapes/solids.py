@@ -142,9 +142,14 @@ def with_section(
     return solid.warp_batch(warp)
 
 
-def below(height: float) -> Manifold:
-    """Everything under a height."""
-    return Manifold.cube((2 * FAR, 2 * FAR, FAR)).translate((-FAR, -FAR, height - FAR))
+def leaning(solid: Manifold, start: float, amount: float) -> Manifold:
+    """The solid bent towards +X above a height, by ``amount`` times the square of the height above it."""
+
+    def warp(points_N3: NDArray[np.float64]) -> NDArray[np.float64]:
+        x, y, z = points_N3.T
+        return np.stack([x + amount * np.maximum(z - start, 0) ** 2, y, z], axis=1)
+
+    return solid.warp_batch(warp)
 
 
 def slab(solid: Manifold, low: float, high: float) -> Manifold:
