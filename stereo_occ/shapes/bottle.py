@@ -28,8 +28,8 @@ CLOSURES: dict[str, dict[str, float]] = {
     "soda": {"cap": 0.55, "lip": 0.3, "plain": 0.15},
     "flask": {"cap": 0.6, "lip": 0.2, "plain": 0.2},
     "jar": {"cap": 0.75, "lip": 0.15, "plain": 0.1},
-    "jug": {"cap": 0.7, "lip": 0.2, "plain": 0.1},
-    "spray": {"spray head": 0.45, "pump": 0.3, "plain": 0.25},
+    "jug": {"cap": 0.75, "lip": 0.25},
+    "spray": {"spray head": 0.45, "pump": 0.35, "cap": 0.2},
     "squeeze": {"nozzle": 0.8, "cap": 0.2},
 }
 
@@ -78,7 +78,7 @@ def bottle(rng: Generator, object_id: str) -> Shape:
     body = _body(rng, outline, closure, thickness)
     solid = section.turned(body.wall, outline)
     if closure in bottle_tops.HEADS:
-        solid += bottle_tops.HEADS[closure](rng, outline.neck_radius)
+        solid += bottle_tops.HEADS[closure](rng, outline)
     parts, handle = {}, "none"
     if kind == "jug" and rng.random() < 0.75:
         handle = str(rng.choice(("grip", *HANDLES))) if not hollow else str(rng.choice(HANDLES))
@@ -91,7 +91,7 @@ def bottle(rng: Generator, object_id: str) -> Shape:
             solid, handle_solid = solid + (tube - section.turned(body.middle, outline)), tube - hull
         parts["handle"] = solids.trimesh_of(handle_solid)
     if kind == "squeeze" and rng.random() < 0.2:
-        solid = solids.leaning(solid, rng.uniform(0.9, 1.0) * outline.shoulder, rng.uniform(0.6, 2.0))
+        solid = solids.leaning(solid, rng.uniform(0.85, 1.0) * outline.shoulder, rng.uniform(0.3, 0.8))
     parts["neck"] = solids.trimesh_of(solids.slab(solid, outline.neck, 1.0))
     parts["floor"] = solids.trimesh_of(solids.slab(solid, -1.0, body.floor))
     mesh = solids.trimesh_of(solid)
@@ -112,12 +112,12 @@ def _body(rng: Generator, outline: Silhouette, closure: str, thickness: float) -
     beyond = [[outline.neck_radius, OPEN]]
     tall = solids.section_of(np.concatenate([outline.profile_N2, beyond]))
     tall = solids.rounded(
-        tall, outward=min(rng.uniform(0.1, 0.5) * outline.radius, 0.9 * outline.neck_radius)
+        tall, outward=min(rng.uniform(0.04, 0.35) * outline.radius, 0.9 * outline.neck_radius)
     )
     hull = tall ^ solids.rectangle((0, OPEN), (-1, 1))
     top = bottle_tops.TOPS.get(closure)
     if top is not None:
-        hull += top(rng, outline.neck_radius)
+        hull += top(rng, outline)
     punt = rng.uniform(0.004, 0.03) if rng.random() < 0.6 else 0.0
     if punt:
         hull -= solids.bead(0.0, 0.0, (0.75 * outline.profile_N2[0, 0], punt))
@@ -156,10 +156,10 @@ def _handle_tube(rng: Generator, kind: str, outline: Silhouette, thickness: floa
 
 def _grip(rng: Generator, outline: Silhouette) -> tuple[Manifold, Manifold]:
     """A hole through the body that leaves a strip to hold, and the region of that strip."""
-    strip = rng.uniform(0.045, 0.07)
-    low = outline.shoulder * rng.uniform(0.55, 0.75)
+    strip = rng.uniform(0.035, 0.06)
+    low = outline.shoulder * rng.uniform(0.4, 0.65)
     high = outline.shoulder + rng.uniform(0.2, 0.6) * (outline.neck - outline.shoulder)
-    inner = rng.uniform(0.3, 0.5) * outline.radius
+    inner = rng.uniform(0.15, 0.4) * outline.radius
     within = solids.offset(solids.section_of(outline.profile_N2), -strip)
     opening = within ^ CrossSection([np.array([[inner, low], [1, low], [1, high], [inner, high]])])
     opening = solids.rounded(opening, outward=0.02)

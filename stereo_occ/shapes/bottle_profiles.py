@@ -34,9 +34,9 @@ FORMS = {
     "wine": Form(width=(0.22, 0.31), neck=(0.34, 0.46), body=(0.42, 0.66), shoulder=(0.1, 0.28), ribbed=0.0),
     "soda": Form(width=(0.24, 0.38), neck=(0.32, 0.48), body=(0.5, 0.7), shoulder=(0.18, 0.28), ribbed=0.5),
     "flask": Form(width=(0.4, 0.72), neck=(0.22, 0.4), body=(0.6, 0.8), shoulder=(0.05, 0.15), ribbed=0.1),
-    "jar": Form(width=(0.45, 0.95), neck=(0.7, 0.96), body=(0.7, 0.86), shoulder=(0.03, 0.1), ribbed=0.15),
-    "jug": Form(width=(0.42, 0.7), neck=(0.2, 0.4), body=(0.5, 0.68), shoulder=(0.12, 0.26), ribbed=0.3),
-    "spray": Form(width=(0.34, 0.55), neck=(0.24, 0.4), body=(0.55, 0.75), shoulder=(0.1, 0.2), ribbed=0.3),
+    "jar": Form(width=(0.45, 0.95), neck=(0.7, 0.96), body=(0.74, 0.88), shoulder=(0.03, 0.08), ribbed=0.15),
+    "jug": Form(width=(0.42, 0.7), neck=(0.2, 0.4), body=(0.56, 0.72), shoulder=(0.14, 0.24), ribbed=0.3),
+    "spray": Form(width=(0.34, 0.55), neck=(0.24, 0.4), body=(0.6, 0.77), shoulder=(0.1, 0.2), ribbed=0.3),
     "squeeze": Form(width=(0.28, 0.5), neck=(0.4, 0.8), body=(0.66, 0.84), shoulder=(0.04, 0.13), ribbed=0.2),
 }
 
@@ -65,7 +65,7 @@ def silhouette(rng: Generator, kind: str) -> Silhouette:
     form = FORMS[kind]
     radius = rng.uniform(*form.width) / 2
     shoulder = rng.uniform(*form.body)
-    neck = min(shoulder + rng.uniform(*form.shoulder), 0.96)
+    neck = min(shoulder + rng.uniform(*form.shoulder), 0.94)
     neck_radius = radius * rng.uniform(*form.neck)
     body_N2 = _body(rng, kind, radius, shoulder)
     if rng.random() < form.ribbed:

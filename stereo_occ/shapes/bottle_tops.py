@@ -5,34 +5,45 @@ from manifold3d import CrossSection, FillRule, Manifold
 from numpy.random import Generator
 
 from stereo_occ.shapes import curves, solids
+from stereo_occ.shapes.bottle_profiles import Silhouette
 
 
-def ring(rng: Generator, radius: float) -> CrossSection:
+def lip(rng: Generator, outline: Silhouette) -> CrossSection:
     """A lip or a collar around the neck near its top."""
     height, below = rng.uniform(0.012, 0.04), rng.uniform(0.0, 0.04)
-    return solids.rectangle((0, radius * rng.uniform(1.12, 1.35)), (1 - below - height, 1 - below))
+    return solids.rectangle(
+        (0, outline.neck_radius * rng.uniform(1.12, 1.35)), (1 - below - height, 1 - below)
+    )
 
 
-def cap(rng: Generator, radius: float) -> CrossSection:
-    """A screw cap or crown over the neck."""
-    width = radius * rng.uniform(1.06, 1.3)
-    low, high = 1 - rng.uniform(0.02, 0.07), 1 + rng.uniform(0.01, 0.06)
-    profile = np.array([[width, low], [width * rng.uniform(0.9, 1.0), high]])
-    return solids.section_of(profile)
+def cap(rng: Generator, outline: Silhouette) -> CrossSection:
+    """A screw cap or crown over some or all of the neck, no wider than the body."""
+    radius = outline.neck_radius
+    width = max(min(radius * rng.uniform(1.06, 1.3), outline.radius), 1.03 * radius)
+    low, high = _covered(rng, outline), 1 + rng.uniform(0.01, 0.05)
+    return solids.section_of(np.array([[width, low], [width * rng.uniform(0.92, 1.0), high]]))
 
 
-def nozzle(rng: Generator, radius: float) -> CrossSection:
+def nozzle(rng: Generator, outline: Silhouette) -> CrossSection:
     """A cap with a conical tip."""
-    width, low, high = radius * rng.uniform(1.0, 1.2), 0.97, 1 + rng.uniform(0.02, 0.1)
-    foot, tip = width * rng.uniform(0.35, 0.7), width * rng.uniform(0.12, 0.3)
+    width, high = outline.neck_radius * rng.uniform(1.03, 1.15), 1 + rng.uniform(0.0, 0.06)
+    foot, tip = width * rng.uniform(0.3, 0.65), width * rng.uniform(0.12, 0.28)
     top = high + rng.uniform(0.08, 0.22)
-    return solids.section_of(np.array([[width, low], [width, high], [foot, high + 0.02], [tip, top]]))
+    low = _covered(rng, outline)
+    profile = [[width, low], [width, high], [foot, high + rng.uniform(0.005, 0.04)], [tip, top]]
+    return solids.section_of(np.array(profile))
 
 
-def spray_head(rng: Generator, radius: float) -> Manifold:
+def _covered(rng: Generator, outline: Silhouette) -> float:
+    """The height down to which a cap covers the neck."""
+    return max(1 - rng.uniform(0.35, 0.95) * (1 - outline.neck), 0.86)
+
+
+def spray_head(rng: Generator, outline: Silhouette) -> Manifold:
     """A trigger head: a collar, a wedge with its nozzle to +X and a curved trigger under it."""
-    collar = radius * rng.uniform(1.15, 1.4)
-    height, length, back = rng.uniform(0.08, 0.13), rng.uniform(0.14, 0.24), rng.uniform(0.04, 0.1)
+    collar = outline.neck_radius * rng.uniform(1.15, 1.4)
+    height, back = rng.uniform(0.08, 0.13), rng.uniform(0.04, 0.1)
+    length = collar + rng.uniform(0.1, 0.18)
     low = 1 + rng.uniform(0.02, 0.05)
     outline = [
         [-collar * 0.7, 1.0],
@@ -46,7 +57,7 @@ def spray_head(rng: Generator, radius: float) -> Manifold:
     side = solids.rounded(CrossSection([np.array(outline)], FillRule.NonZero), outward=0.012, inward=0.01)
     width = collar * rng.uniform(1.0, 1.5)
     head = side.extrude(width).translate((0, 0, -width / 2)).rotate((90, 0, 0))
-    start = np.array([0.55 * length, low + 0.4 * height])
+    start = np.array([collar + 0.035, low + 0.4 * height])
     drop = rng.uniform(0.1, 0.16)
     lever = curves.bezier(
         [start, start + [0.2 * length, -0.3 * drop], start + [0, -0.7 * drop], start + [0.1, -drop]], 16
@@ -56,9 +67,9 @@ def spray_head(rng: Generator, radius: float) -> Manifold:
     return head + solids.sweep(lever, sizes, 3.0, 12) + collar_ring
 
 
-def pump(rng: Generator, radius: float) -> Manifold:
+def pump(rng: Generator, outline: Silhouette) -> Manifold:
     """A lotion pump: a collar, a thin stem and a head whose spout points to +X."""
-    collar, stem = radius * rng.uniform(1.1, 1.4), radius * rng.uniform(0.25, 0.45)
+    collar, stem = outline.neck_radius * rng.uniform(1.1, 1.4), outline.neck_radius * rng.uniform(0.25, 0.45)
     top, reach = 1 + rng.uniform(0.07, 0.16), rng.uniform(0.1, 0.2)
     low = solids.rectangle((0, collar), (0.94, 1 + rng.uniform(0.01, 0.04)))
     head = solids.rectangle((0, 2 * stem), (top - 0.02, top + 0.015))
@@ -70,7 +81,7 @@ def pump(rng: Generator, radius: float) -> Manifold:
 
 
 #: Lathe sections added to the neck, by closure; a plain neck has none.
-TOPS = {"lip": ring, "cap": cap, "nozzle": nozzle}
+TOPS = {"lip": lip, "cap": cap, "nozzle": nozzle}
 
 #: Solids added to the neck, by closure.
 HEADS = {"spray head": spray_head, "pump": pump}

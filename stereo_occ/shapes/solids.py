@@ -61,7 +61,7 @@ def rounded(section: CrossSection, outward: float = 0.0, inward: float = 0.0) ->
 
 def lathe(section: CrossSection, segments: int = 56) -> Manifold:
     """The solid of revolution of a mirrored section about +Z."""
-    return section.simplify(4e-4).revolve(segments)
+    return section.simplify(6e-4).revolve(segments)
 
 
 def sweep(path_N2: Points, half_sizes_N2: Points, exponent: float = 2.0, sides: int = 20) -> Manifold:
@@ -142,12 +142,37 @@ def with_section(
     return solid.warp_batch(warp)
 
 
-def leaning(solid: Manifold, start: float, amount: float) -> Manifold:
-    """The solid bent towards +X above a height, by ``amount`` times the square of the height above it."""
+def leaning(solid: Manifold, start: float, slope: float) -> Manifold:
+    """The solid sheared towards +X above a height, smoothly up to a slope at its top."""
+    top = solid.bounding_box()[5]
 
     def warp(points_N3: NDArray[np.float64]) -> NDArray[np.float64]:
         x, y, z = points_N3.T
-        return np.stack([x + amount * np.maximum(z - start, 0) ** 2, y, z], axis=1)
+        return np.stack([x + slope * np.maximum(z - start, 0) ** 2 / (2 * (top - start)), y, z], axis=1)
+
+    return solid.warp_batch(warp)
+
+
+def scalloped(solid: Manifold, lobes: int, depth: float) -> Manifold:
+    """A lathed solid whose radius waves around the axis, from not at all at its base to ``depth`` at its top."""
+    base, top = solid.bounding_box()[2], solid.bounding_box()[5]
+
+    def warp(points_N3: NDArray[np.float64]) -> NDArray[np.float64]:
+        x, y, z = points_N3.T
+        wave = 1 + depth * np.cos(lobes * np.arctan2(y, x)) * (z - base) / (top - base)
+        return np.stack([x * wave, y * wave, z], axis=1)
+
+    return solid.warp_batch(warp)
+
+
+def peaked(solid: Manifold, rise: float) -> Manifold:
+    """A lathed solid stretched upwards in its four diagonal directions, by ``rise`` times the height."""
+    base = solid.bounding_box()[2]
+
+    def warp(points_N3: NDArray[np.float64]) -> NDArray[np.float64]:
+        x, y, z = points_N3.T
+        diagonal = np.sin(2 * np.arctan2(y, x)) ** 2
+        return np.stack([x, y, z + rise * diagonal * np.maximum(z - base, 0) ** 2], axis=1)
 
     return solid.warp_batch(warp)
 
