@@ -1,4 +1,4 @@
-"""Procedural bottles: a lathed or sectioned body with a neck, a closure and sometimes a handle; mostly solid."""
+"""Procedural bottles: a body with a neck, a closure and sometimes a handle; mostly solid."""
 
 from dataclasses import dataclass
 

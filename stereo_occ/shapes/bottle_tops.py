@@ -1,4 +1,4 @@
-"""What closes a bottle: caps, stoppers, nozzles, spray heads and pumps, on a neck whose top is at height 1."""
+"""What closes a bottle: caps, nozzles, spray heads and pumps, on a neck whose top is at height 1."""
 
 import numpy as np
 from manifold3d import CrossSection, FillRule, Manifold
@@ -45,7 +45,7 @@ def spray_head(rng: Generator, outline: Silhouette) -> Manifold:
     height, back = rng.uniform(0.08, 0.13), rng.uniform(0.04, 0.1)
     length = collar + rng.uniform(0.1, 0.18)
     low = 1 + rng.uniform(0.02, 0.05)
-    outline = [
+    profile = [
         [-collar * 0.7, 1.0],
         [collar * 0.7, 1.0],
         [collar * 0.9, low],
@@ -54,14 +54,13 @@ def spray_head(rng: Generator, outline: Silhouette) -> Manifold:
         [-back, low + height],
         [-back - 0.02, low + 0.6 * height],
     ]
-    side = solids.rounded(CrossSection([np.array(outline)], FillRule.NonZero), outward=0.012, inward=0.01)
+    side = solids.rounded(CrossSection([np.array(profile)], FillRule.NonZero), outward=0.012, inward=0.01)
     width = collar * rng.uniform(1.0, 1.5)
     head = side.extrude(width).translate((0, 0, -width / 2)).rotate((90, 0, 0))
-    start = np.array([collar + 0.035, low + 0.4 * height])
+    x, z = collar + 0.035, low + 0.4 * height
     drop = rng.uniform(0.1, 0.16)
-    lever = curves.bezier(
-        [start, start + [0.2 * length, -0.3 * drop], start + [0, -0.7 * drop], start + [0.1, -drop]], 16
-    )
+    control = [[x, z], [x + 0.2 * length, z - 0.3 * drop], [x, z - 0.7 * drop], [x + 0.1, z - drop]]
+    lever = curves.bezier(control, 16)
     sizes = np.tile([[0.011, 0.35 * width]], (16, 1))
     collar_ring = solids.lathe(solids.rectangle((0, collar), (0.95, 1.01)), 40)
     return head + solids.sweep(lever, sizes, 3.0, 12) + collar_ring

@@ -50,23 +50,20 @@ def bowl(rng: Generator, object_id: str) -> Shape:
 
 def _turned(rng: Generator, kind: str, wall: CrossSection) -> tuple[Manifold, str]:
     """The solid and the name of its horizontal section."""
-    if kind == "oval":
-        return solids.with_section(
-            solids.lathe(wall, 64), rng.uniform(2.0, 2.5), rng.uniform(0.6, 0.88)
-        ), "oval"
-    if kind == "rounded square":
-        solid = solids.with_section(solids.lathe(wall, 64), rng.uniform(2.8, 7.0), rng.uniform(0.75, 1.0))
-        if rng.random() < 0.35:
-            solid = solids.peaked(solid, rng.uniform(0.1, 0.4))
-        return solid, "rounded square"
     style = rng.random()
-    if style < 0.08:
+    if style < 0.08 and kind not in ("oval", "rounded square"):
         facets = int(rng.choice((6, 8, 10, 12, 16)))
         return solids.lathe(wall, facets), f"{facets} facets"
+    solid = solids.lathe(wall, 64, tolerance=1.2e-3)
+    if kind == "oval":
+        return solids.with_section(solid, rng.uniform(2.0, 2.5), rng.uniform(0.6, 0.88)), "oval"
+    if kind == "rounded square":
+        solid = solids.with_section(solid, rng.uniform(2.8, 7.0), rng.uniform(0.75, 1.0))
+        return (solids.peaked(solid, rng.uniform(0.08, 0.3)) if style < 0.35 else solid), "rounded square"
     if style < 0.16 and kind != "incurved":
-        lobes = int(rng.integers(5, 17))
-        return solids.scalloped(solids.lathe(wall, 80), lobes, rng.uniform(0.1, 0.4) / lobes), "scalloped"
-    return solids.lathe(wall, 64), "round"
+        lobes = int(rng.integers(5, 13))
+        return solids.scalloped(solid, lobes, rng.uniform(0.1, 0.4) / lobes), "scalloped"
+    return solid, "round"
 
 
 def _profile(rng: Generator, kind: str) -> Points:

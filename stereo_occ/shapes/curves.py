@@ -1,4 +1,4 @@
-"""Planar curves from which the procedural objects are made. A profile is (radius, height), a path is (x, height)."""
+"""Planar curves of the procedural objects: a profile is (radius, height), a path is (x, height)."""
 
 from collections.abc import Sequence
 from typing import TypeAlias
@@ -11,7 +11,7 @@ Points: TypeAlias = NDArray[np.float64]
 
 
 def bezier(control_K2: ArrayLike, count: int = 24) -> Points:
-    """Points of the Bezier curve of any degree (de Casteljau), equally spaced in its parameter, (count, 2)."""
+    """Points of a Bezier curve of any degree (de Casteljau), equally spaced in its parameter, (count, 2)."""
     t_N11 = np.linspace(0, 1, count)[:, None, None]
     points_NK2 = np.broadcast_to(np.asarray(control_K2, np.float64), (count, *np.shape(control_K2)))
     while points_NK2.shape[1] > 1:
@@ -51,7 +51,7 @@ def resampled(points_N2: Points, count: int) -> Points:
 
 
 def smallest_bend(points_N2: Points) -> float:
-    """The smallest radius of curvature along a polyline (of the circles through three neighbouring points)."""
+    """The smallest radius of curvature along a polyline: of the circles through three neighbours."""
     a, b, c = points_N2[:-2], points_N2[1:-1], points_N2[2:]
     ab, bc, ca = b - a, c - b, a - c
     area = np.abs(ab[:, 0] * bc[:, 1] - ab[:, 1] * bc[:, 0]) / 2

@@ -1,7 +1,7 @@
 """Procedural mugs: a vessel of many profiles with, mostly, a handle. The height of the body is 1."""
 
 import numpy as np
-from manifold3d import CrossSection
+from manifold3d import CrossSection, Manifold
 from numpy.random import Generator
 
 from stereo_occ.shapes import curves, solids
@@ -33,18 +33,18 @@ def mug(rng: Generator, object_id: str) -> Shape:
         foot=_foot(rng, profile_N2),
         lip=_lip(rng, profile_N2, thickness),
     )
-    facets = int(rng.choice((6, 8, 10, 12))) if rng.random() < 0.06 else 0
+    facets = int(rng.choice((6, 8, 10, 12, 16))) if rng.random() < 0.06 else 0
     exponent = rng.uniform(2.8, 5.0) if not facets and rng.random() < 0.05 else 2.0
 
-    def turned(section: CrossSection) -> solids.Manifold:
-        solid = solids.lathe(section, facets or 56)
+    def turned(section: CrossSection, tolerance: float) -> Manifold:
+        solid = solids.lathe(section, facets or 56, tolerance)
         return solids.with_section(solid, exponent, 1.0) if exponent > 2 else solid
 
-    solid, parts = turned(cup.wall), {}
+    solid, parts = turned(cup.wall, 6e-4), {}
     if handle:
         tube = handle_tube(rng, handle, profile_N2, depth=thickness + handle.thickness)
-        parts["handle"] = solids.trimesh_of(tube - turned(cup.hull))
-        solid += tube - turned(cup.middle)
+        parts["handle"] = solids.trimesh_of(tube - turned(cup.hull, 1e-3))
+        solid += tube - turned(cup.middle, 3e-3)
     parts["floor"] = solids.trimesh_of(solids.slab(solid, -1.0, cup.floor))
     mesh = solids.trimesh_of(solid)
     facts: dict[str, str | float | bool] = {
@@ -52,8 +52,8 @@ def mug(rng: Generator, object_id: str) -> Shape:
         "handle": kind,
         "handle_section": handle.section if handle else "none",
         "section": f"{facets} facets" if facets else "rounded square" if exponent > 2 else "round",
-        "wall_thickness": thickness / float(mesh.extents.max()),
         "hollow": True,
+        "wall_thickness": thickness / float(mesh.extents.max()),
     }
     return Shape("mug", object_id, mesh, parts, facts)
 
@@ -74,7 +74,7 @@ def _profile(rng: Generator, body: str, with_handle: bool) -> Points:
         at = rng.uniform(0.4, 0.65)
         return curves.monotone([0, at, 1], [r * rng.uniform(0.92, 1.03), r * rng.uniform(0.8, 0.92), r])
     if body == "flared":
-        low, at = rng.uniform(0.65, 0.92), rng.uniform(0.6, 0.85)
+        low, at = rng.uniform(0.74, 0.94), rng.uniform(0.6, 0.85)
         return curves.monotone([0, at, 1], [r * low, r * (low + rng.uniform(0.0, 0.04)), r])
     if body == "footed":
         foot, rise = rng.uniform(0.5, 0.75), rng.uniform(0.04, 0.12)
@@ -107,5 +107,5 @@ def _lip(rng: Generator, profile_N2: Points, thickness: float) -> CrossSection |
     """One rim in six is thickened by a bead."""
     if rng.random() > 1 / 6:
         return None
-    size = thickness * rng.uniform(0.6, 1.0)
+    size = thickness * rng.uniform(0.55, 0.85)
     return solids.bead(profile_N2[-1, 0] - thickness * rng.uniform(0.2, 0.5), 1 - size * 0.6, (size, size))

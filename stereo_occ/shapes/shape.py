@@ -21,8 +21,8 @@ class Shape:
         category: one of :data:`CATEGORIES`.
         object_id: unique within its data set.
         mesh: watertight, outward winding, positive volume.
-        parts: solids that delimit the named parts, in the object frame; an occupied point belongs to the first one that
-            contains it, else to the wall. Empty where the parts are not known.
+        parts: solids that delimit the named parts, in the object frame; an occupied point belongs to the
+            first one that contains it, else to the wall. Empty where the parts are not known.
         facts: plain figures about the object (kind, wall thickness, ...) for reports.
     """
 

@@ -1,7 +1,7 @@
 """Solids of the procedural objects, by manifold3d: lathed profiles, swept tubes, warped sections.
 
-While an object is built its axis is +Z and its handle points to +X; :func:`trimesh_of` turns +Z into +Y, which is up in
-the object frame.
+While an object is built its axis is +Z and its handle points to +X; :func:`trimesh_of` turns +Z into +Y,
+which is up in the object frame.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ FAR = 10.0
 
 
 def section_of(profile_N2: Points) -> CrossSection:
-    """The lathe section under a profile from its lowest to its highest point: closed to the axis and mirrored.
+    """The lathe section of a profile from its lowest to its highest point: closed to the axis, mirrored.
 
     It is mirrored so that rounding leaves the points on the axis alone.
     """
@@ -59,9 +59,9 @@ def rounded(section: CrossSection, outward: float = 0.0, inward: float = 0.0) ->
     return section
 
 
-def lathe(section: CrossSection, segments: int = 56) -> Manifold:
-    """The solid of revolution of a mirrored section about +Z."""
-    return section.simplify(6e-4).revolve(segments)
+def lathe(section: CrossSection, segments: int = 56, tolerance: float = 6e-4) -> Manifold:
+    """The solid of revolution about +Z of a mirrored section, first simplified to a tolerance."""
+    return section.simplify(tolerance).revolve(segments)
 
 
 def sweep(path_N2: Points, half_sizes_N2: Points, exponent: float = 2.0, sides: int = 20) -> Manifold:
@@ -87,25 +87,20 @@ def sweep(path_N2: Points, half_sizes_N2: Points, exponent: float = 2.0, sides: 
 
 
 def skin(rings_NK3: NDArray[np.float64]) -> Manifold:
-    """The solid between the first and the last of a stack of rings, closed by a fan at both ends."""
+    """The solid through a stack of rings that turn clockwise seen from the last one, closed by fans."""
     count, sides, _ = rings_NK3.shape
-    ends_23 = rings_NK3[[0, -1]].mean(axis=1)
     index_NK = np.arange(count * sides).reshape(count, sides)
     following_NK = np.roll(index_NK, -1, axis=1)
     a, b, c, d = index_NK[:-1], following_NK[:-1], following_NK[1:], index_NK[1:]
-    first, last = count * sides, count * sides + 1
-    faces = np.concatenate(
-        [
-            np.stack([a, b, c], axis=-1).reshape(-1, 3),
-            np.stack([a, c, d], axis=-1).reshape(-1, 3),
-            np.stack([following_NK[0], index_NK[0], np.full(sides, first)], axis=-1),
-            np.stack([index_NK[-1], following_NK[-1], np.full(sides, last)], axis=-1),
-        ]
-    )
-    vertices = np.concatenate([rings_NK3.reshape(-1, 3), ends_23])
-    if Trimesh(vertices, faces, process=False).volume < 0:
-        faces = faces[:, ::-1]
-    return Manifold(Mesh64(vertices, np.ascontiguousarray(faces, np.uint64)))
+    first, last = np.full(sides, count * sides), np.full(sides, count * sides + 1)
+    triangles = [
+        np.stack([a, c, b], axis=-1).reshape(-1, 3),
+        np.stack([a, d, c], axis=-1).reshape(-1, 3),
+        np.stack([index_NK[0], following_NK[0], first], axis=-1),
+        np.stack([following_NK[-1], index_NK[-1], last], axis=-1),
+    ]
+    vertices = np.concatenate([rings_NK3.reshape(-1, 3), rings_NK3[[0, -1]].mean(axis=1)])
+    return Manifold(Mesh64(vertices, np.concatenate(triangles).astype(np.uint64)))
 
 
 def superellipse(
@@ -154,7 +149,7 @@ def leaning(solid: Manifold, start: float, slope: float) -> Manifold:
 
 
 def scalloped(solid: Manifold, lobes: int, depth: float) -> Manifold:
-    """A lathed solid whose radius waves around the axis, from not at all at its base to ``depth`` at its top."""
+    """A lathed solid whose radius waves around the axis, by nothing at its base and ``depth`` at its top."""
     base, top = solid.bounding_box()[2], solid.bounding_box()[5]
 
     def warp(points_N3: NDArray[np.float64]) -> NDArray[np.float64]:

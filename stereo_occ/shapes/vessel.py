@@ -78,7 +78,7 @@ def vessel(
 
 
 def _beyond(end: Points, along: Points, thickness: float) -> CrossSection:
-    """What a rim square to the direction ``along`` cuts off: a box from the end of the profile, and all far above."""
+    """What a rim square to ``along`` cuts off: a box beyond the end of the profile, and all far above."""
     across = 2.5 * thickness * np.array([-along[1], along[0]])
     far = end + 6 * thickness * along
     right = CrossSection(
