@@ -49,10 +49,8 @@ def full_grid(occupancy: Cup, resolution: int) -> int:
 
 def main() -> None:
     """Print one line per resolution."""
-    print(
     versions = ", ".join(f"{name} {version(name)}" for name in ("scikit-image", "torch", "numpy"))
     print(f"{versions}, {torch.get_num_threads()} thread(s)")
-    )
     for resolution in (64, 128):
         sparse, dense = Cup(), Cup()
         start = perf_counter()
