@@ -35,4 +35,4 @@ def procedural_shape(category: str, seed: int, index: int) -> Shape:
             f"category '{category}' has no procedural objects: choose among {', '.join(CATEGORIES)}"
         )
     rng = np.random.default_rng([seed, CATEGORIES.index(category), index])
-    return _MAKERS[category](rng, f"{category}_{seed}_{index:05d}").normalized()
+    return _MAKERS[category](rng, f"{category}_{index:04d}").normalized()
