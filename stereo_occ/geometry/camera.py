@@ -8,17 +8,20 @@ from math import cos, pi, sin, tan
 from typing import TypeVar
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from stereo_occ.errors import UserError
 
-Array = TypeVar("Array", NDArray[np.floating], torch.Tensor)
+Array = TypeVar("Array", NDArray[np.float64], NDArray[np.float32], Tensor)
 
 
 def transform_points(points_N3: Array, target_from_source_44: Array) -> Array:
     """Apply a 4x4 affine transform to row-vector points ``(..., N, 3)``."""
-    return points_N3 @ target_from_source_44[..., :3, :3].mT + target_from_source_44[..., None, :3, 3]
+    moved_N3: Array = (
+        points_N3 @ target_from_source_44[..., :3, :3].mT + target_from_source_44[..., None, :3, 3]
+    )
+    return moved_N3
 
 
 def project(points_N3: Array, K_33: Array, camera_from_rig_44: Array) -> tuple[Array, Array]:
@@ -33,14 +36,12 @@ def project(points_N3: Array, K_33: Array, camera_from_rig_44: Array) -> tuple[A
     return homogeneous_N3[..., :2] / homogeneous_N3[..., 2:], camera_N3[..., 2]
 
 
-def normalize_pixels(pixels_N2: Array, width: int, height: int) -> Array:
+def normalize_pixels(pixels_N2: Tensor, width: int, height: int) -> Tensor:
     """Pixels to the [-1, 1] coordinates of ``grid_sample(align_corners=False)``.
 
     -1 and 1 are the outer edges of the image, so the same coordinates address feature maps of any stride.
     """
-    if isinstance(pixels_N2, torch.Tensor):
-        return (2 * pixels_N2 + 1) / pixels_N2.new_tensor([width, height]) - 1
-    return (2 * pixels_N2 + 1) / np.array([width, height]) - 1
+    return (2 * pixels_N2 + 1) / pixels_N2.new_tensor([width, height]) - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,19 +62,27 @@ class Camera:
         """Rig-frame points ``(N, 3)`` to pixels ``(N, 2)`` and depths ``(N,)``; see :func:`project`."""
         return project(points_N3, self.K, self.camera_from_rig)
 
-    def unproject(
-        self, pixels_N2: NDArray[np.float64], depth_N: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def unproject(self, pixels_N2: NDArray[np.float64], depth_N: NDArray[np.float64]) -> NDArray[np.float64]:
         """Pixels ``(N, 2)`` at depths ``(N,)`` metres to rig-frame points ``(N, 3)``; inverse of :meth:`project`."""
         homogeneous_N3 = np.concatenate([pixels_N2, np.ones_like(pixels_N2[..., :1])], axis=-1)
         camera_N3 = homogeneous_N3 @ np.linalg.inv(self.K).T * depth_N[..., None]
-        return transform_points(camera_N3, np.linalg.inv(self.camera_from_rig))
+        rig_N3: NDArray[np.float64] = transform_points(camera_N3, np.linalg.inv(self.camera_from_rig))
+        return rig_N3
 
     @property
     def center(self) -> NDArray[np.float64]:
         """Optical centre in the rig frame, ``(3,)`` metres."""
         rotation, translation = self.camera_from_rig[:3, :3], self.camera_from_rig[:3, 3]
         return -rotation.T @ translation
+
+    def clearance(self, point_3: NDArray[np.float64]) -> float:
+        """Distance in metres from a rig-frame point to the nearest side of the view; negative outside it."""
+        left, top, right, bottom = -0.5, -0.5, self.width - 0.5, self.height - 0.5
+        # The plane through the optical centre and the pixel line a u + b v + c = 0 has the normal K^T (a, b, c).
+        lines_43 = np.array([[1, 0, -left], [0, 1, -top], [-1, 0, right], [0, -1, bottom]])
+        normals_43 = lines_43 @ self.K
+        normals_43 /= np.linalg.norm(normals_43, axis=1, keepdims=True)
+        return float((normals_43 @ transform_points(point_3[None], self.camera_from_rig)[0]).min())
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,11 +112,17 @@ def toed_in_rig(distance: float, half_angle: float, fov: float, side: int) -> St
         fov: vertical field of view, radians (pi/3).
         side: image side in pixels; images are square.
     """
-    for name, value, upper in (("distance", distance, np.inf), ("half_angle", half_angle, pi / 2), ("fov", fov, pi)):
+    for name, value, upper in (
+        ("distance", distance, np.inf),
+        ("half_angle", half_angle, pi / 2),
+        ("fov", fov, pi),
+    ):
         if not 0 < value < upper:
             raise UserError(f"rig.{name}: must lie in (0, {upper:.4g}), got {value}")
     K = intrinsics(fov, side)
-    return StereoRig(*(Camera(K, look_at_origin(angle, distance), side, side) for angle in (-half_angle, half_angle)))
+    return StereoRig(
+        *(Camera(K, look_at_origin(angle, distance), side, side) for angle in (-half_angle, half_angle))
+    )
 
 
 def intrinsics(fov: float, side: int) -> NDArray[np.float64]:
@@ -133,7 +148,9 @@ def check_rigid(matrix_44: NDArray[np.float64], name: str) -> None:
     """Raise :class:`UserError` unless the 4x4 matrix is a rotation and a translation, to 1e-5."""
     rotation = matrix_44[:3, :3]
     if matrix_44.shape != (4, 4) or not np.isfinite(matrix_44).all():
-        raise UserError(f"{name}: must be a finite 4x4 matrix, got shape {matrix_44.shape}: {matrix_44.tolist()}")
+        raise UserError(
+            f"{name}: must be a finite 4x4 matrix, got shape {matrix_44.shape}: {matrix_44.tolist()}"
+        )
     if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-5) or np.linalg.det(rotation) < 0:
         raise UserError(
             f"{name}: the upper left 3x3 block must be a rotation (orthonormal, determinant +1), "

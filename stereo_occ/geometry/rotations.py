@@ -11,4 +11,4 @@ def random_rotations(count: int, rng: np.random.Generator) -> NDArray[np.float64
     Four independent normal variates, normalised, are a uniform unit quaternion (Shoemake, Graphics Gems III, 1992),
     and the double cover of SO(3) by unit quaternions carries the uniform measure over.
     """
-    return Rotation.from_quat(rng.standard_normal((count, 4))).as_matrix()
+    return np.asarray(Rotation.from_quat(rng.standard_normal((count, 4))).as_matrix())

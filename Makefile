@@ -1,0 +1,53 @@
+# Every target that needs the environment builds it first; `make help` lists them.
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin
+READY := $(VENV)/.ready
+DEMO := outputs/demo
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint types check tensorboard figures lock clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(READY) ## virtual environment .venv with the locked packages and this one, editable
+
+$(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "stereo_occ: $$($(PYTHON) --version) is too old, need 3.11 or later; set PYTHON=python3.x" >&2; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+	$(RUN)/pip install --quiet --no-deps --require-hashes -r requirements.lock
+	$(RUN)/pip install --quiet --no-deps --no-build-isolation -e .
+	@touch $@
+
+demo: $(READY) ## render a small data set, train, evaluate, write meshes and pictures (minutes)
+	@$(RUN)/python -m stereo_occ.train scale=smoke hydra.run.dir=$(DEMO)/train resume=never
+	@$(RUN)/python -m stereo_occ.evaluate checkpoint=$(DEMO)/train/best.ckpt points=20000 views=4 hydra.run.dir=$(DEMO)/evaluation
+	@echo
+	@echo "pictures (left | right | predicted | true): $(DEMO)/evaluation/pictures"
+	@echo "meshes (GLB):                               $(DEMO)/evaluation/meshes"
+	@echo "metrics:                                    $(DEMO)/evaluation/metrics.json"
+	@echo "curves:                                     make tensorboard"
+
+test: $(READY) ## run the tests
+	$(RUN)/python -m pytest
+
+lint: $(READY) ## ruff: rules and format
+	$(RUN)/ruff check .
+	$(RUN)/ruff format --check .
+
+types: $(READY) ## mypy, strict
+	$(RUN)/mypy
+
+check: lint types test ## all that must pass before a change goes in
+
+tensorboard: $(READY) ## open the dashboards of every run under outputs/
+	$(RUN)/tensorboard --logdir outputs
+
+lock: ## renew requirements.lock from pyproject.toml (needs uv)
+	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes \
+		--no-emit-index-url --no-header -o requirements.lock
+
+clean: ## remove the environment and caches, keep outputs/
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache

@@ -1,0 +1,65 @@
+"""Checkpoints: what they hold beyond Lightning's own state, and reading them without executing code."""
+
+from pathlib import Path
+from typing import Any
+
+import torch
+from lightning.pytorch import Callback, LightningModule, Trainer
+from omegaconf import DictConfig, OmegaConf
+
+from stereo_occ.config import TrainConfig
+from stereo_occ.data.prepare import build_rig
+from stereo_occ.errors import UserError
+from stereo_occ.models.build import build_model
+from stereo_occ.task import OccupancyTask
+
+VERSION = 1
+KEY = "stereo_occ"
+
+
+class StoreConfig(Callback):
+    """Puts the resolved configuration, as plain values, into every checkpoint."""
+
+    def __init__(self, config: dict[str, Any]) -> None:
+        self.config = config
+
+    def on_save_checkpoint(
+        self, trainer: Trainer, pl_module: LightningModule, checkpoint: dict[str, Any]
+    ) -> None:
+        checkpoint[KEY] = {"version": VERSION, "config": self.config}
+
+
+def plain(cfg: DictConfig) -> dict[str, Any]:
+    """A configuration as nested plain dictionaries, interpolations resolved, enums by name."""
+    container = OmegaConf.to_container(cfg, resolve=True, enum_to_str=True, throw_on_missing=True)
+    assert isinstance(container, dict)
+    return {str(key): value for key, value in container.items()}
+
+
+def build_task(cfg: DictConfig) -> OccupancyTask:
+    """A fresh task for a training configuration."""
+    typed = OmegaConf.to_object(cfg)
+    assert isinstance(typed, TrainConfig)
+    rig = build_rig(typed.rig, typed.data.image_side)
+    return OccupancyTask(build_model(plain(cfg.model), rig), typed.optimizer, typed.scheduler, typed.steps)
+
+
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """The contents of a checkpoint file; ``[KEY]["config"]`` is the training configuration.
+
+    Raises:
+        UserError: the file is damaged, holds more than plain data, or is of another version.
+    """
+    try:
+        checkpoint = torch.load(path, map_location="cpu", weights_only=True)
+    except Exception as error:
+        reason = next(iter(str(error).splitlines()), type(error).__name__)
+        raise UserError(
+            f"checkpoint={path}: cannot be read ({reason}); give a checkpoint of a training run"
+        ) from error
+    version = checkpoint.get(KEY, {}).get("version")
+    if version != VERSION:
+        raise UserError(
+            f"checkpoint={path}: has format version {version}, expected {VERSION}; train it again"
+        )
+    return dict(checkpoint)

@@ -1,0 +1,296 @@
+"""Schemas of the configuration: every key, its type and its meaning. The values are in ``conf/``.
+
+Each YAML file lists its schema (``base_...``) first, so that unknown keys and wrong types fail with the full key.
+"""
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from hydra.core.config_store import ConfigStore
+from omegaconf import MISSING, DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from stereo_occ.errors import UserError
+from stereo_occ.models.config import register_schemas as register_model_schemas
+from stereo_occ.render.appearance import BackgroundConfig, LightsConfig, MaterialConfig
+
+
+class SplitKind(Enum):
+    """What is held out."""
+
+    object = "object"  # no object is in two splits
+    view = "view"  # the paper's wording: the views of every object are divided
+
+
+class Placement(Enum):
+    """Where the object is."""
+
+    paper = "paper"  # unit diagonal, centred at the fixation point
+    free = "free"  # diagonal log-uniform in [0.4, 1], centre anywhere that keeps it in both views and in the cube
+
+
+class Resume(Enum):
+    """What a run does with checkpoints already in its folder."""
+
+    never = "never"
+    auto = "auto"
+
+
+@dataclass
+class ScaleConfig:
+    """How big everything is, in one place; other groups refer to it."""
+
+    image_side: int = MISSING  # pixels
+    views: int = MISSING  # stereo pairs per object
+    counts: dict[str, int] = MISSING  # procedural objects per category
+    points: int = MISSING  # query points per pair and step
+    batch_size: int = MISSING  # pairs per step
+    steps: int = MISSING  # optimiser steps
+    decoder_hidden: int = MISSING
+    decoder_blocks: int = MISSING
+    disparities: int = MISSING  # cells of the one-sided correlation volume
+
+
+@dataclass
+class DataConfig:
+    """Which objects, how many views of each, how they are divided."""
+
+    name: str = MISSING
+    seed: int = MISSING  # of objects, poses, appearances and point pools; apart from the seed of training
+    views: int = MISSING
+    image_side: int = MISSING
+    pool_size: int = MISSING  # labelled points per pool and object
+    split: SplitKind = MISSING
+    fractions: list[float] = MISSING  # train, val, test
+
+
+@dataclass
+class ProceduralConfig(DataConfig):
+    """Generated mugs, bowls and bottles."""
+
+    name: str = "procedural"
+    counts: dict[str, int] = MISSING
+
+
+@dataclass
+class MeshesConfig(DataConfig):
+    """A folder of meshes, ``category/name/model.*``."""
+
+    name: str = "meshes"
+    root: str = MISSING
+
+
+@dataclass
+class RigConfig:
+    """Two cameras on a circle about the fixation point."""
+
+    distance: float = MISSING  # metres from each camera to the fixation point
+    half_angle_deg: float = MISSING  # angle of each camera from the mid-line
+    fov_deg: float = MISSING  # vertical field of view
+
+
+@dataclass
+class PlacementConfig:
+    """Where the object is."""
+
+    kind: Placement = MISSING
+    diagonal: list[float] = MISSING  # log-uniform range of the bounding box diagonal, metres
+
+
+@dataclass
+class CategoriesConfig:
+    """Which categories are used."""
+
+    names: list[str] = MISSING
+
+
+@dataclass
+class PathsConfig:
+    """Folders, relative to the working directory."""
+
+    outputs: str = MISSING
+    data: str = MISSING  # rendered shards
+
+
+@dataclass
+class PairsConfig:
+    """What pairs there are: all that decides the content of the shards, and where they are."""
+
+    data: DataConfig = MISSING
+    rig: RigConfig = MISSING
+    placement: PlacementConfig = MISSING
+    lights: LightsConfig = MISSING
+    material: MaterialConfig = MISSING
+    background: BackgroundConfig = MISSING
+    categories: CategoriesConfig = MISSING
+    scale: ScaleConfig = MISSING
+    paths: PathsConfig = MISSING
+    workers: int = MISSING  # rendering processes; 0: one per core
+
+
+@dataclass
+class ModelConfig:
+    """Any model; see ``stereo_occ.models.config`` for each."""
+
+    name: str = MISSING
+
+
+@dataclass
+class QueriesConfig:
+    """Where the query points of a training step lie, as shares that add up to 1."""
+
+    box: float = MISSING  # uniform in the object's bounding box: the paper's
+    outside: float = MISSING  # uniform in the cube outside the box, known to be empty
+    surface: float = MISSING  # near the surface
+
+
+@dataclass
+class OptimizerConfig:
+    """Adam or AdamW."""
+
+    name: str = MISSING
+    lr: float = MISSING
+    betas: list[float] = MISSING
+    weight_decay: float = MISSING
+
+
+@dataclass
+class SchedulerConfig:
+    """Learning rate over steps."""
+
+    name: str = MISSING
+    warmup: int = MISSING  # steps of linear warm-up
+    final: float = MISSING  # last learning rate as a share of the first
+
+
+@dataclass
+class ValidationConfig:
+    """When and how IoU is measured during training, and which state is kept."""
+
+    interval: int = MISSING  # optimiser steps
+    views: int = MISSING  # poses per validation object
+    points: int = MISSING  # per view, for each of the box and the cube
+    checkpoint_interval: int = MISSING  # steps between copies of the latest state
+
+
+@dataclass
+class TrainerConfig:
+    """Hardware."""
+
+    accelerator: str = MISSING
+    devices: int = MISSING
+    precision: str = MISSING
+    threads: int | None = None  # of torch; null leaves torch's choice
+    workers: int = MISSING  # loader processes
+    gradient_clip: float | None = None
+
+
+@dataclass
+class LoggerConfig:
+    """What is written for TensorBoard."""
+
+    tensorboard: bool = MISSING
+    interval: int = MISSING  # steps between training losses
+    examples: int = MISSING  # pairs and meshes shown per category
+    mesh_resolution: int = MISSING  # cells per side of the shown meshes
+
+
+@dataclass
+class TrainConfig(PairsConfig):
+    """``python -m stereo_occ.train``"""
+
+    model: Any = MISSING
+    queries: QueriesConfig = MISSING
+    optimizer: OptimizerConfig = MISSING
+    scheduler: SchedulerConfig = MISSING
+    validation: ValidationConfig = MISSING
+    trainer: TrainerConfig = MISSING
+    logger: LoggerConfig = MISSING
+    seed: int = MISSING
+    steps: int = MISSING
+    points: int = MISSING
+    batch_size: int = MISSING
+    resume: Resume = MISSING
+    progress: bool = MISSING
+
+
+@dataclass
+class EvaluateConfig:
+    """``python -m stereo_occ.evaluate``; what is null is taken from the checkpoint."""
+
+    checkpoint: str = MISSING
+    subset: str = MISSING
+    views: int = MISSING  # poses per object
+    points: int = MISSING  # per view and metric
+    batch_size: int = MISSING  # views per forward pass
+    examples: int = MISSING  # meshes and pictures per category
+    mesh_resolution: int = MISSING
+    data: Any = None
+    rig: Any = None
+    placement: Any = None
+    lights: Any = None
+    material: Any = None
+    background: Any = None
+    categories: Any = None
+    paths: PathsConfig = MISSING
+    trainer: TrainerConfig = MISSING
+    workers: int = MISSING
+    progress: bool = MISSING
+
+
+@dataclass
+class RenderConfig(PairsConfig):
+    """``python -m stereo_occ.render``"""
+
+    progress: bool = field(default=True)
+
+
+DATA_SCHEMAS: dict[str, type[DataConfig]] = {
+    schema.name: schema for schema in (ProceduralConfig, MeshesConfig)
+}
+
+
+def training_config(values: dict[str, Any]) -> DictConfig:
+    """The typed training configuration of plain values, as a checkpoint holds them.
+
+    Raises:
+        UserError: a key is unknown or a value has the wrong type.
+    """
+    try:
+        data = {"data": OmegaConf.structured(DATA_SCHEMAS[values["data"]["name"]])}
+        cfg = OmegaConf.merge(OmegaConf.structured(TrainConfig), data, values)
+    except (KeyError, OmegaConfBaseException) as error:
+        raise UserError(
+            f"configuration: {str(error).splitlines()[0]}; it was written by another version"
+        ) from error
+    assert isinstance(cfg, DictConfig)
+    return cfg
+
+
+def register_schemas() -> None:
+    """Tell Hydra the schemas and OmegaConf the resolver ``divide``; safe to call again."""
+    OmegaConf.register_new_resolver("divide", lambda a, b: int(a) // int(b), replace=True)
+    store = ConfigStore.instance()
+    for name, root in (("train", TrainConfig), ("render", RenderConfig), ("evaluate", EvaluateConfig)):
+        store.store(name=f"base_{name}", node=root)
+    for group, schema in (
+        ("rig", RigConfig),
+        ("placement", PlacementConfig),
+        ("lights", LightsConfig),
+        ("material", MaterialConfig),
+        ("background", BackgroundConfig),
+        ("categories", CategoriesConfig),
+        ("scale", ScaleConfig),
+        ("paths", PathsConfig),
+        ("queries", QueriesConfig),
+        ("optimizer", OptimizerConfig),
+        ("scheduler", SchedulerConfig),
+        ("validation", ValidationConfig),
+        ("trainer", TrainerConfig),
+        ("logger", LoggerConfig),
+    ):
+        store.store(group=group, name=f"base_{group}", node=schema)
+    for name, data_schema in DATA_SCHEMAS.items():
+        store.store(group="data", name=f"base_{name}", node=data_schema)
+    register_model_schemas(store)

@@ -1,0 +1,117 @@
+"""Lightning's view of the shards."""
+
+from typing import Any
+
+import lightning
+from torch.utils.data import DataLoader
+
+from stereo_occ.config import PairsConfig, QueriesConfig, SplitKind
+from stereo_occ.data.batch import Batch
+from stereo_occ.data.dataset import EvaluationPairs, ShuffledBatches, TrainingPairs
+from stereo_occ.data.prepare import PreparedShards, prepare
+from stereo_occ.data.shard import Shard
+from stereo_occ.data.splits import SUBSETS, split_objects, split_views
+from stereo_occ.errors import UserError
+
+
+class PairsDataModule(lightning.LightningDataModule):
+    """Renders what is missing, divides it into subsets and serves batches.
+
+    Args:
+        evaluation_views: poses per object in validation and test.
+        evaluation_points: query points per pose and metric.
+    """
+
+    def __init__(
+        self,
+        pairs: PairsConfig,
+        evaluation_views: int,
+        evaluation_points: int,
+        evaluation_batch_size: int,
+        workers: int = 0,
+        progress: bool = True,
+    ) -> None:
+        super().__init__()
+        self.pairs = pairs
+        self.evaluation_views = evaluation_views
+        self.evaluation_points = evaluation_points
+        self.evaluation_batch_size = evaluation_batch_size
+        self.workers = workers
+        self.progress = progress
+        self.prepared: PreparedShards | None = None
+        self._training: dict[str, Any] = {}
+
+    def for_training(
+        self, queries: QueriesConfig, points: int, batch_size: int, steps: int, seed: int
+    ) -> None:
+        """Say what training needs; without it only the evaluation loaders work."""
+        self._training = {
+            "queries": queries,
+            "points": points,
+            "batch_size": batch_size,
+            "steps": steps,
+            "seed": seed,
+        }
+
+    def prepare_data(self) -> None:
+        """Render the missing shards."""
+        self.prepared = prepare(self.pairs, self.progress)
+
+    def subset(self, name: str) -> tuple[list[Shard], list[int]]:
+        """The shards of ``train``, ``val``, ``test`` or ``all``, and which views of each belong to it."""
+        if self.prepared is None:
+            self.prepare_data()
+        assert self.prepared is not None
+        data, shards = self.pairs.data, dict(zip(self.prepared.objects, self.prepared.paths, strict=True))
+        if name == "all":
+            return [Shard(path) for path in shards.values()], list(range(data.views))
+        if name not in SUBSETS:
+            raise UserError(f"subset={name}: must be one of {', '.join([*SUBSETS, 'all'])}")
+        if data.split is SplitKind.view:
+            return [Shard(path) for path in shards.values()], list(
+                split_views(data.views, data.fractions, name)
+            )
+        split = split_objects(self.prepared.objects, data.fractions, data.seed)
+        return [Shard(shards[key]) for key in split[name]], list(range(data.views))
+
+    def train_dataloader(self) -> DataLoader[Batch]:
+        """Shuffled batches from the trainer's current step on."""
+        settings = self._training
+        shards, views = self.subset("train")
+        dataset = TrainingPairs(shards, views, settings["queries"], settings["points"], settings["seed"])
+        first_step = self.trainer.global_step if self.trainer else 0
+        batches = ShuffledBatches(
+            len(dataset), settings["batch_size"], settings["steps"], settings["seed"], first_step
+        )
+        return self._loader(dataset, batch_sampler=batches)
+
+    def val_dataloader(self) -> DataLoader[Batch]:
+        """Validation objects with fixed points."""
+        return self.evaluation_loader("val")
+
+    def test_dataloader(self) -> DataLoader[Batch]:
+        """Test objects with fixed points."""
+        return self.evaluation_loader("test")
+
+    def evaluation_loader(self, subset: str) -> DataLoader[Batch]:
+        """Fixed points on any subset."""
+        return self._loader(self.evaluation_dataset(subset), batch_size=self.evaluation_batch_size)
+
+    def evaluation_dataset(self, subset: str) -> EvaluationPairs:
+        """The first ``evaluation_views`` poses of each object of a subset, with fixed points."""
+        shards, views = self.subset(subset)
+        return EvaluationPairs(shards, views[: self.evaluation_views], self.evaluation_points)
+
+    def _loader(self, dataset: TrainingPairs | EvaluationPairs, **kwargs: Any) -> DataLoader[Batch]:
+        return DataLoader(
+            dataset,
+            collate_fn=_as_it_is,
+            num_workers=self.workers,
+            persistent_workers=self.workers > 0,
+            multiprocessing_context="spawn" if self.workers else None,
+            **kwargs,
+        )
+
+
+def _as_it_is(batch: Any) -> Any:
+    return batch

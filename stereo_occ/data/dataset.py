@@ -1,0 +1,160 @@
+"""Map-style data sets over shards; items are asked for and returned as whole batches."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from zlib import crc32
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch.utils.data import Dataset, Sampler
+
+from stereo_occ.config import QueriesConfig
+from stereo_occ.data.batch import Batch, Queries, ViewId
+from stereo_occ.data.shard import Shard
+from stereo_occ.models.base import StereoViews
+from stereo_occ.occupancy.queries import (
+    LabelledPoints,
+    bbox_queries,
+    cube_queries,
+    outside_queries,
+    surface_queries,
+)
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One item of a training batch: which view, and its position in the run, which seeds its points."""
+
+    item: int
+    position: int
+
+
+class ShuffledBatches(Sampler[list[Draw]]):
+    """Batches of one long shuffled stream, a pure function of (seed, step).
+
+    The stream is one permutation of all items after another, cut into batches without regard to where a permutation
+    ends, so every batch is full and a run continues from any step with the data it would have seen.
+    """
+
+    def __init__(self, items: int, batch_size: int, steps: int, seed: int, first_step: int = 0) -> None:
+        self.items = items
+        self.batch_size = batch_size
+        self.steps = steps
+        self.seed = seed
+        self.first_step = first_step
+
+    def __len__(self) -> int:
+        return self.steps
+
+    def __iter__(self) -> Iterator[list[Draw]]:
+        first, last = self.first_step * self.batch_size, self.steps * self.batch_size
+        batch: list[Draw] = []
+        for epoch in range(first // self.items, -(-last // self.items)):
+            order = np.random.default_rng([self.seed, epoch]).permutation(self.items)
+            start = epoch * self.items
+            for position in range(max(first, start), min(last, start + self.items)):
+                batch.append(Draw(int(order[position - start]), position))
+                if len(batch) == self.batch_size:
+                    yield batch
+                    batch = []
+
+
+class PairsDataset(Dataset[Batch]):
+    """Stereo pairs of some views of some shards, without points: the part that training and evaluation share."""
+
+    def __init__(self, shards: Sequence[Shard], views: Sequence[int]) -> None:
+        self.shards = shards
+        self.views = views
+
+    def __len__(self) -> int:
+        return len(self.shards) * len(self.views)
+
+    def locate(self, item: int) -> tuple[Shard, int]:
+        """The shard and the view of an item; all views of one object follow each other."""
+        shard, view = divmod(item, len(self.views))
+        return self.shards[shard], self.views[view]
+
+    def batch(self, items: Sequence[int], points: Sequence[dict[str, LabelledPoints]]) -> Batch:
+        """Images, cameras and names of ``items`` with their labelled points."""
+        located = [self.locate(item) for item in items]
+        rgb_B2HWC = torch.from_numpy(np.stack([shard.rgb(view) for shard, view in located]))
+        rgb_2BCHW = rgb_B2HWC.permute(1, 0, 4, 2, 3).float().div_(255)
+        K_B, camera_from_rig_B = zip(
+            *((shard.cameras[0][view], shard.cameras[1][view]) for shard, view in located), strict=True
+        )
+        return Batch(
+            views=StereoViews(
+                rgb_2BCHW[0], rgb_2BCHW[1], _float(np.stack(K_B)), _float(np.stack(camera_from_rig_B))
+            ),
+            queries={
+                name: Queries(
+                    _float(np.stack([item[name].points_N3 for item in points])),
+                    _float(np.stack([item[name].occupied_N for item in points])),
+                )
+                for name in points[0]
+            },
+            ids=[ViewId(shard.category, shard.object_id, view) for shard, view in located],
+        )
+
+
+class TrainingPairs(PairsDataset):
+    """Pairs with randomly drawn query points under the name ``train``."""
+
+    def __init__(
+        self, shards: Sequence[Shard], views: Sequence[int], queries: QueriesConfig, points: int, seed: int
+    ) -> None:
+        super().__init__(shards, views)
+        surface, outside = round(queries.surface * points), round(queries.outside * points)
+        self.counts = {"box": points - surface - outside, "outside": outside, "surface": surface}
+        self.seed = seed
+
+    def __getitems__(self, draws: list[Draw]) -> Batch:
+        return self.batch([draw.item for draw in draws], [{"train": self._points(draw)} for draw in draws])
+
+    def _points(self, draw: Draw) -> LabelledPoints:
+        shard, view = self.locate(draw.item)
+        pose, box = shard.poses[view], shard.pool("box")
+        rng = np.random.default_rng([self.seed, draw.position])
+        parts = []
+        if self.counts["box"]:
+            parts.append(bbox_queries(box, pose, self.counts["box"], rng))
+        if self.counts["outside"]:
+            parts.append(outside_queries(box, pose, self.counts["outside"], rng))
+        if self.counts["surface"]:
+            parts.append(surface_queries(shard.pool("surface"), pose, self.counts["surface"], rng))
+        return LabelledPoints(
+            np.concatenate([part.points_N3 for part in parts]),
+            np.concatenate([part.occupied_N for part in parts]),
+        )
+
+
+class EvaluationPairs(PairsDataset):
+    """Pairs with fixed query points, the same for every model and in every run.
+
+    ``bbox`` is uniform in the posed bounding box, ``cube`` uniform in the working volume, and ``unposed`` are the
+    points of ``bbox`` left in the object frame, with the labels they have there: the suspected metric of the paper.
+    """
+
+    def __init__(self, shards: Sequence[Shard], views: Sequence[int], points: int) -> None:
+        super().__init__(shards, views)
+        self.points = points
+
+    def __getitems__(self, items: list[int]) -> Batch:
+        return self.batch(items, [self._points(item) for item in items])
+
+    def _points(self, item: int) -> dict[str, LabelledPoints]:
+        shard, view = self.locate(item)
+        pose, pool = shard.poses[view], shard.pool("box")
+        rng = np.random.default_rng([crc32(f"{shard.category}/{shard.object_id}".encode()), view])
+        bbox = bbox_queries(pool, pose, self.points, rng)
+        cube = cube_queries(pool, pose, self.points, rng)
+        return {
+            "bbox": bbox,
+            "cube": cube,
+            "unposed": LabelledPoints(pose.to_object(bbox.points_N3), bbox.occupied_N),
+        }
+
+
+def _float(array: NDArray[np.generic]) -> torch.Tensor:
+    return torch.from_numpy(array.astype(np.float32))

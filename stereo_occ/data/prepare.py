@@ -1,0 +1,173 @@
+"""Render the shards that a configuration asks for and that are not there yet."""
+
+import hashlib
+import json
+import multiprocessing
+import os
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from enum import Enum
+from functools import cache
+from math import radians
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+from tqdm import tqdm
+
+from stereo_occ.config import PairsConfig, RigConfig
+from stereo_occ.data.objects import ObjectSource, list_objects
+from stereo_occ.data.placement import draw_pose
+from stereo_occ.data.shard import VERSION, Views, write_shard
+from stereo_occ.geometry.camera import StereoRig, toed_in_rig
+from stereo_occ.occupancy.pools import box_pool, surface_pool
+from stereo_occ.render.appearance import draw_appearance
+from stereo_occ.render.stereo import StereoRenderer
+from stereo_occ.shapes.folder import Skipped
+
+# Independent random streams of one object.
+POINTS_STREAM, VIEWS_STREAM = 0, 1
+
+
+@dataclass(frozen=True)
+class PreparedShards:
+    """Shards on disk: ``paths[i]`` holds ``objects[i]``; ``skipped`` are files that are no usable object."""
+
+    folder: Path
+    objects: list[tuple[str, str]]
+    paths: list[Path]
+    skipped: list[Skipped]
+
+
+def build_rig(config: RigConfig, side: int) -> StereoRig:
+    """The calibrated cameras of a configuration for images of ``side`` pixels."""
+    return toed_in_rig(config.distance, radians(config.half_angle_deg), radians(config.fov_deg), side)
+
+
+def prepare(pairs: PairsConfig, progress: bool) -> PreparedShards:
+    """Make sure that every shard of ``pairs`` exists; render the missing ones with a progress bar.
+
+    A shard's content depends on the configuration and the object alone: not on the number of processes, nor on which
+    other objects are asked for, nor on interruptions.
+
+    Raises:
+        UserError: from the objects, the renderer or the disk.
+    """
+    sources, skipped = list_objects(pairs.data, pairs.categories.names)
+    folder = Path(pairs.paths.data) / _folder_name(pairs)
+    paths = [folder / source.category / f"{source.object_id}.h5" for source in sources]
+    missing = [(source, path) for source, path in zip(sources, paths, strict=True) if not path.exists()]
+    if missing:
+        _remove_partial(folder)
+        _write_description(folder, pairs)
+        workers = min(len(missing), pairs.workers or os.cpu_count() or 1)
+        bar = tqdm(
+            total=len(missing) * pairs.data.views,
+            desc="rendering",
+            unit="pair",
+            disable=not progress,
+            smoothing=0.05,
+        )
+        with bar:
+            for _ in _render_all(missing, pairs, workers):
+                bar.update(pairs.data.views)
+    return PreparedShards(folder, [(s.category, s.object_id) for s in sources], paths, skipped)
+
+
+def render_object(source: ObjectSource, path: Path, pairs: PairsConfig) -> None:
+    """Build, render, label and write one object."""
+    data = pairs.data
+    shape = source.build()
+    object_seed = [data.seed, crc32(f"{source.category}/{source.object_id}".encode())]
+    points_rng = np.random.default_rng([*object_seed, POINTS_STREAM])
+    pools = {
+        "box": box_pool(shape, data.pool_size, points_rng),
+        "surface": surface_pool(shape, data.pool_size, points_rng),
+    }
+    rig = build_rig(pairs.rig, data.image_side)
+    renderer = _renderer()
+    renderer.load(shape.mesh)
+    rgb, mask, depth, poses = [], [], [], []
+    low, high = pairs.placement.diagonal
+    for view in range(data.views):
+        rng = np.random.default_rng([*object_seed, VIEWS_STREAM, view])
+        pose = draw_pose(pairs.placement.kind.value, (low, high), rig, rng)
+        appearance = draw_appearance(pairs.lights, pairs.material, pairs.background, rng)
+        images = renderer.render(rig, pose.rig_from_object, appearance)
+        rgb.append(images.rgb_2HW3)
+        mask.append(images.mask_2HW)
+        depth.append(images.depth_2HW.astype(np.float16))
+        poses.append(pose.rig_from_object)
+    cameras = (len(poses), 1, 1, 1)
+    views = Views(
+        rgb=np.stack(rgb),
+        mask=np.stack(mask),
+        depth=np.stack(depth),
+        K=np.tile(np.stack([camera.K for camera in rig.cameras]), cameras),
+        camera_from_rig=np.tile(np.stack([camera.camera_from_rig for camera in rig.cameras]), cameras),
+        rig_from_object=np.stack(poses),
+    )
+    write_shard(path, shape, views, pools)
+
+
+@cache
+def _renderer() -> StereoRenderer:
+    """The one renderer of this process."""
+    return StereoRenderer()
+
+
+def _render_all(tasks: list[tuple[ObjectSource, Path]], pairs: PairsConfig, workers: int) -> Iterable[None]:
+    if workers == 1:
+        for source, path in tasks:
+            render_object(source, path, pairs)
+            yield
+        return
+    # Spawned, not forked: a forked process inherits a GL state that hangs it.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        jobs = [pool.submit(render_object, source, path, pairs) for source, path in tasks]
+        try:
+            for job in as_completed(jobs):
+                yield job.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _folder_name(pairs: PairsConfig) -> str:
+    """A name that changes with everything that changes a shard's content."""
+    digest = hashlib.sha256(json.dumps(_description(pairs), sort_keys=True).encode()).hexdigest()
+    return f"{pairs.data.name}_{pairs.data.image_side}px_{digest[:10]}"
+
+
+def _description(pairs: PairsConfig) -> dict[str, object]:
+    data = asdict(pairs.data)
+    for division in ("counts", "split", "fractions"):
+        data.pop(division, None)
+    if "root" in data:
+        data["root"] = str(Path(data["root"]).resolve())
+    parts = {
+        name: asdict(getattr(pairs, name))
+        for name in ("rig", "placement", "lights", "material", "background")
+    }
+    return _plain({"shard_version": VERSION, "data": data, **parts})  # type: ignore[return-value]
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return value.value if isinstance(value, Enum) else value
+
+
+def _write_description(folder: Path, pairs: PairsConfig) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "dataset.json").write_text(json.dumps(_description(pairs), indent=2, sort_keys=True) + "\n")
+
+
+def _remove_partial(folder: Path) -> None:
+    """Remove what a killed process of an earlier run left behind."""
+    for partial_file in folder.glob("*/.*.part"):
+        process = int(partial_file.name.split(".")[-2])
+        if not Path(f"/proc/{process}").exists():
+            partial_file.unlink(missing_ok=True)

@@ -1,0 +1,156 @@
+"""``python -m stereo_occ.evaluate``: test metrics, one row per object, example meshes and pictures."""
+
+import csv
+import logging
+from pathlib import Path
+from typing import Any
+
+import lightning
+import torch
+from hydra.core.hydra_config import HydraConfig
+from lightning.pytorch.callbacks import TQDMProgressBar
+from omegaconf import DictConfig, OmegaConf
+from PIL import Image
+
+from stereo_occ.checkpoint import KEY, build_task, read_checkpoint
+from stereo_occ.checks import check_evaluation
+from stereo_occ.cli import entry_point
+from stereo_occ.config import EvaluateConfig, TrainConfig, training_config
+from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.data.examples import examples
+from stereo_occ.data.prepare import build_rig
+from stereo_occ.metrics_file import environment, write_json
+from stereo_occ.pictures import comparison
+from stereo_occ.reconstruction import reconstruct
+from stereo_occ.task import OccupancyTask
+
+logger = logging.getLogger(__name__)
+
+GROUPS = ("data", "rig", "placement", "lights", "material", "background", "categories")
+
+
+def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
+    """Evaluate ``cfg.checkpoint`` and write ``metrics.json``, ``per_object.csv``, ``meshes/`` and ``pictures/``.
+
+    Returns:
+        The metrics, with the keys of ``metrics.json``'s ``metrics``.
+    """
+    settings = OmegaConf.to_object(cfg)
+    assert isinstance(settings, EvaluateConfig)
+    if settings.trainer.threads:
+        torch.set_num_threads(settings.trainer.threads)
+    checkpoint = read_checkpoint(Path(settings.checkpoint))
+    trained = training_config(checkpoint[KEY]["config"])
+    task = build_task(trained)
+    task.load_state_dict(checkpoint["state_dict"])
+    data = build_data(cfg, settings, trained)
+    trainer = lightning.Trainer(
+        accelerator=settings.trainer.accelerator,
+        devices=settings.trainer.devices,
+        precision=settings.trainer.precision,  # type: ignore[arg-type]
+        logger=False,
+        enable_checkpointing=False,
+        callbacks=[TQDMProgressBar()] if settings.progress else [],
+        enable_progress_bar=settings.progress,
+        enable_model_summary=False,
+        default_root_dir=folder,
+    )
+    trainer.test(task, data.evaluation_loader(settings.subset), verbose=False)
+    metrics = {name: float(value) for name, value in trainer.callback_metrics.items()}
+    write_results(folder, settings, checkpoint["global_step"], task, data, metrics)
+    write_examples(folder, settings, task, data)
+    return metrics
+
+
+def build_data(cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig) -> PairsDataModule:
+    """The checkpoint's own data, with the groups replaced that the command line gives."""
+    pairs = trained.copy()
+    for group in GROUPS:
+        if cfg[group] is not None:
+            pairs[group] = cfg[group]
+    pairs.paths, pairs.workers = cfg.paths, cfg.workers
+    typed = OmegaConf.to_object(pairs)
+    assert isinstance(typed, TrainConfig)
+    return PairsDataModule(
+        typed,
+        evaluation_views=settings.views,
+        evaluation_points=settings.points,
+        evaluation_batch_size=settings.batch_size,
+        workers=settings.trainer.workers,
+        progress=settings.progress,
+    )
+
+
+def write_results(
+    folder: Path,
+    settings: EvaluateConfig,
+    step: int,
+    task: OccupancyTask,
+    data: PairsDataModule,
+    metrics: dict[str, float],
+) -> None:
+    """``metrics.json``, ``per_object.csv`` and, where files were left out, ``skipped.csv``."""
+    threshold = float(task.threshold)
+    rows = task.scores.rows(threshold)
+    assert data.prepared is not None
+    skipped = [vars(file) for file in data.prepared.skipped]
+    write_json(
+        folder / "metrics.json",
+        environment()
+        | {
+            "checkpoint": settings.checkpoint,
+            "step": step,
+            "parameters": sum(p.numel() for p in task.model.parameters()),
+            "subset": settings.subset,
+            "data": str(data.prepared.folder),
+            "objects": len(rows),
+            "views": settings.views,
+            "points": settings.points,
+            "threshold": threshold,
+            "skipped": len(skipped),
+            "metrics": metrics,
+        },
+    )
+    write_csv(folder / "per_object.csv", rows)
+    if skipped:
+        write_csv(folder / "skipped.csv", skipped)
+
+
+def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
+    """Rows with the same keys as a CSV file."""
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def write_examples(
+    folder: Path, settings: EvaluateConfig, task: OccupancyTask, data: PairsDataModule
+) -> None:
+    """Example meshes as GLB and pictures as PNG, left | right | predicted | true."""
+    rig = build_rig(data.pairs.rig, data.pairs.data.image_side)
+    for name in ("meshes", "pictures"):
+        (folder / name).mkdir(exist_ok=True)
+    for example in examples(data.evaluation_dataset(settings.subset), settings.examples):
+        views = example.batch.views
+        predicted = reconstruct(task.model, views, float(task.threshold), settings.mesh_resolution)
+        stem = f"{example.id.category}_{example.id.object_id}_view{example.id.view}"
+        for kind, mesh in (("predicted", predicted), ("true", example.true)):
+            if len(mesh.faces):
+                mesh.export(folder / "meshes" / f"{stem}_{kind}.glb")
+        strip = comparison(views.left_BCHW[0], views.right_BCHW[0], predicted, example.true, rig)
+        Image.fromarray(strip).save(folder / "pictures" / f"{stem}.png")
+
+
+@entry_point("evaluate", check_evaluation)
+def main(cfg: DictConfig) -> None:
+    """Evaluate into Hydra's run folder and print where to look."""
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    metrics = evaluate(cfg, folder)
+    for name in ("iou", "iou_bbox", "iou_unrotated"):
+        logger.info("test/%s %.4f", name, metrics[f"test/{name}"])
+    logger.info("results, meshes and pictures are in %s", folder)
+
+
+if __name__ == "__main__":
+    main()

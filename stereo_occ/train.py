@@ -1,0 +1,114 @@
+"""``python -m stereo_occ.train``: render what is missing, train, validate, write the run folder."""
+
+from pathlib import Path
+
+import lightning
+import torch
+from hydra.core.hydra_config import HydraConfig
+from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelCheckpoint, TQDMProgressBar
+from lightning.pytorch.loggers import TensorBoardLogger
+from omegaconf import DictConfig, OmegaConf
+
+from stereo_occ.checkpoint import StoreConfig, build_task, plain
+from stereo_occ.checks import check_training
+from stereo_occ.cli import entry_point
+from stereo_occ.config import Resume, TrainConfig
+from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.metrics_file import WriteMetrics
+from stereo_occ.tensorboard import ShowInTensorBoard
+
+
+def train(cfg: DictConfig, folder: Path) -> lightning.Trainer:
+    """Train ``cfg`` in ``folder``, from its latest checkpoint if ``resume=auto`` and there is one."""
+    typed = OmegaConf.to_object(cfg)
+    assert isinstance(typed, TrainConfig)
+    if typed.trainer.threads:
+        torch.set_num_threads(typed.trainer.threads)
+    data = build_data(typed)
+    data.prepare_data()
+    lightning.seed_everything(typed.seed, verbose=False)
+    task = build_task(cfg)
+    trainer = build_trainer(typed, folder, build_callbacks(cfg, typed, folder))
+    latest = folder / "last.ckpt"
+    resume = typed.resume is Resume.auto and latest.exists()
+    trainer.fit(task, data, ckpt_path=latest if resume else None, weights_only=True)
+    return trainer
+
+
+def build_data(typed: TrainConfig) -> PairsDataModule:
+    """The data of a training configuration."""
+    data = PairsDataModule(
+        typed,
+        evaluation_views=typed.validation.views,
+        evaluation_points=typed.validation.points,
+        evaluation_batch_size=typed.batch_size,
+        workers=typed.trainer.workers,
+        progress=typed.progress,
+    )
+    data.for_training(typed.queries, typed.points, typed.batch_size, typed.steps, typed.seed)
+    return data
+
+
+def build_callbacks(cfg: DictConfig, typed: TrainConfig, folder: Path) -> list[Callback]:
+    """Checkpoints (best and latest), metrics file, pictures, progress bar."""
+    validation = typed.validation
+    callbacks: list[Callback] = [
+        StoreConfig(plain(cfg)),
+        ModelCheckpoint(
+            folder,
+            filename="best",
+            monitor="val/iou",
+            mode="max",
+            auto_insert_metric_name=False,
+            enable_version_counter=False,
+        ),
+        ModelCheckpoint(
+            folder,
+            filename="last",
+            every_n_train_steps=validation.checkpoint_interval,
+            enable_version_counter=False,
+        ),
+        WriteMetrics(folder / "metrics.json"),
+    ]
+    if typed.logger.tensorboard:
+        callbacks += [
+            ShowInTensorBoard(typed.logger, plain(cfg)),
+            LearningRateMonitor(logging_interval="step"),
+        ]
+    if typed.progress:
+        callbacks.append(TQDMProgressBar(refresh_rate=10))
+    return callbacks
+
+
+def build_trainer(typed: TrainConfig, folder: Path, callbacks: list[Callback]) -> lightning.Trainer:
+    """A trainer of exactly ``steps`` optimiser steps that validates every ``validation.interval`` of them."""
+    return lightning.Trainer(
+        accelerator=typed.trainer.accelerator,
+        devices=typed.trainer.devices,
+        precision=typed.trainer.precision,  # type: ignore[arg-type]
+        max_steps=typed.steps,
+        max_epochs=-1,
+        val_check_interval=typed.validation.interval,
+        check_val_every_n_epoch=None,
+        num_sanity_val_steps=0,
+        gradient_clip_val=typed.trainer.gradient_clip,
+        log_every_n_steps=typed.logger.interval,
+        logger=TensorBoardLogger(folder, name="", version="tensorboard")
+        if typed.logger.tensorboard
+        else False,
+        callbacks=callbacks,
+        enable_progress_bar=typed.progress,
+        enable_model_summary=False,
+        use_distributed_sampler=False,
+        default_root_dir=folder,
+    )
+
+
+@entry_point("train", check_training)
+def main(cfg: DictConfig) -> None:
+    """Train into Hydra's run folder."""
+    train(cfg, Path(HydraConfig.get().runtime.output_dir))
+
+
+if __name__ == "__main__":
+    main()
