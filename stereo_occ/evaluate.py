@@ -129,17 +129,21 @@ def write_examples(
 ) -> None:
     """Example meshes as GLB and pictures as PNG, left | right | predicted | true."""
     rig = build_rig(data.pairs.rig, data.pairs.data.image_side)
-    for name in ("meshes", "pictures"):
-        (folder / name).mkdir(exist_ok=True)
     for example in examples(data.evaluation_dataset(settings.subset), settings.examples):
         views = example.batch.views
         predicted = reconstruct(task.model, views, float(task.threshold), settings.mesh_resolution)
-        stem = f"{example.id.category}_{example.id.object_id}_view{example.id.view}"
+        name = f"{example.id.category}/{example.id.object_id}_view{example.id.view}"
         for kind, mesh in (("predicted", predicted), ("true", example.true)):
             if len(mesh.faces):
-                mesh.export(folder / "meshes" / f"{stem}_{kind}.glb")
+                mesh.export(_inside(folder / "meshes", f"{name}_{kind}.glb"))
         strip = comparison(views.left_BCHW[0], views.right_BCHW[0], predicted, example.true, rig)
-        Image.fromarray(strip).save(folder / "pictures" / f"{stem}.png")
+        Image.fromarray(strip).save(_inside(folder / "pictures", f"{name}.png"))
+
+
+def _inside(folder: Path, name: str) -> Path:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path
 
 
 @entry_point("evaluate", check_evaluation)

@@ -37,7 +37,8 @@ def picture(mesh: Trimesh, rig: StereoRig) -> NDArray[np.uint8]:
         return np.full((PANEL, PANEL, 3), 255, dtype=np.uint8)
     with StereoRenderer() as renderer:
         renderer.load(mesh)
-        return renderer.render(resized(rig, PANEL), np.eye(4), _LOOK).rgb_2HW3[0]
+        images = renderer.render(resized(rig, PANEL), np.eye(4), _LOOK)
+    return images.rgb_2HW3[0]
 
 
 def resized(rig: StereoRig, side: int) -> StereoRig:
@@ -56,4 +57,4 @@ def _resized(camera: Camera, side: int) -> Camera:
 def enlarge(image_CHW: Tensor) -> NDArray[np.uint8]:
     """An RGB image in [0, 1] as ``(PANEL, PANEL, 3)`` bytes, pixels kept visible."""
     image_HWC = torch.nn.functional.interpolate(image_CHW[None], size=(PANEL, PANEL))[0].permute(1, 2, 0)
-    return np.asarray((image_HWC.clamp(0, 1) * 255).round().byte().cpu())
+    return np.asarray((image_HWC.clamp(0, 1) * 255).round().cpu(), dtype=np.uint8)

@@ -21,7 +21,7 @@ class ConditionalBatchNorm(nn.Module):
             mean_C, variance_C = self.norm.get_buffer("running_mean"), self.norm.get_buffer("running_var")
             gain_B1C = gain_B1C * torch.rsqrt(variance_C + self.norm.eps)
             bias_B1C = bias_B1C - gain_B1C * mean_C
-        return torch.addcmul(bias_B1C.to(x_BNC), x_BNC, gain_B1C.to(x_BNC)).relu_()
+        return (x_BNC * gain_B1C.to(x_BNC)).add_(bias_B1C.to(x_BNC)).relu_()  # addcmul has a slower backward
 
 
 class ConditionalBlock(nn.Module):

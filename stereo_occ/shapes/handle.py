@@ -43,7 +43,7 @@ def handle_tube(rng: Generator, handle: Handle, profile_N2: Points, depth: float
     bulge = max(0.0, float((radius - chord)[between].max(initial=0.0)))
     path_N2 = _path(rng, handle, top, bottom, handle.clearance + handle.thickness / 2 + bulge)
     inward = np.array([[-depth, 0.0]])
-    path_N2 = curves.resampled(np.concatenate([path_N2[:1] + inward, path_N2, path_N2[-1:] + inward]), 44)
+    path_N2 = curves.resampled(np.concatenate([path_N2[:1] + inward, path_N2, path_N2[-1:] + inward]), 38)
 
     half = min(handle.thickness / 2, 0.8 * curves.smallest_bend(path_N2[4:-4]))
     exponent, width = {

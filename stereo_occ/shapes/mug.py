@@ -37,13 +37,13 @@ def mug(rng: Generator, object_id: str) -> Shape:
     exponent = rng.uniform(2.8, 5.0) if not facets and rng.random() < 0.05 else 2.0
 
     def turned(section: CrossSection, tolerance: float) -> Manifold:
-        solid = solids.lathe(section, facets or 56, tolerance)
+        solid = solids.lathe(section, facets or 52, tolerance)
         return solids.with_section(solid, exponent, 1.0) if exponent > 2 else solid
 
     solid, parts = turned(cup.wall, 6e-4), {}
     if handle:
         tube = handle_tube(rng, handle, profile_N2, depth=thickness + handle.thickness)
-        parts["handle"] = solids.trimesh_of(tube - turned(cup.hull, 1e-3))
+        parts["handle"] = solids.trimesh_of(tube - turned(cup.hull, 1.5e-3))
         solid += tube - turned(cup.middle, 3e-3)
     parts["floor"] = solids.trimesh_of(solids.slab(solid, -1.0, cup.floor))
     mesh = solids.trimesh_of(solid)

@@ -64,7 +64,7 @@ def lathe(section: CrossSection, segments: int = 56, tolerance: float = 6e-4) ->
     return section.simplify(tolerance).revolve(segments)
 
 
-def sweep(path_N2: Points, half_sizes_N2: Points, exponent: float = 2.0, sides: int = 20) -> Manifold:
+def sweep(path_N2: Points, half_sizes_N2: Points, exponent: float = 2.0, sides: int = 18) -> Manifold:
     """A capped tube along a path in the XZ plane.
 
     Args:
