@@ -82,11 +82,12 @@ def bottle(rng: Generator, object_id: str) -> Shape:
     parts, handle = {}, "none"
     if kind == "jug" and rng.random() < 0.75:
         handle = str(rng.choice(("grip", *HANDLES))) if not hollow else str(rng.choice(HANDLES))
-        hull = section.turned(body.hull, outline)
         if handle == "grip":
             hole, around = _grip(rng, outline)
-            solid, handle_solid = solid - hole, hull ^ around
+            solid -= hole
+            handle_solid = solid ^ around
         else:
+            hull = section.turned(body.hull, outline)
             tube = _handle_tube(rng, handle, outline, thickness)
             solid, handle_solid = solid + (tube - section.turned(body.middle, outline)), tube - hull
         parts["handle"] = solids.trimesh_of(handle_solid)

@@ -28,7 +28,7 @@ def bowl(rng: Generator, object_id: str) -> Shape:
     body = vessel(
         profile_N2,
         thickness,
-        floor=thickness * rng.uniform(0.9, 2.2),
+        floor=thickness * rng.uniform(1.0, 2.2),
         base_radius=rng.uniform(0.01, 0.06),
         cavity_radius=rng.uniform(0.03, 0.25),
         rim=rng.uniform(0.15, 0.45),

@@ -112,10 +112,14 @@ def _outward(mesh: Trimesh) -> Trimesh:
         )
     if not mesh.is_winding_consistent:
         mesh.fix_normals(multibody=False)
-    if mesh.volume < 0:
+    if not mesh.is_winding_consistent:
+        raise UserError("its faces cannot all be turned outward (a one-sided surface)")
+    with np.errstate(invalid="ignore"):  # trimesh divides by the volume for the centre of mass
+        volume = mesh.volume
+    if abs(volume) <= 1e-9 * mesh.scale**3:
+        raise UserError(f"encloses no volume ({volume:.3g} in a box of diagonal {mesh.scale:.3g})")
+    if volume < 0:
         mesh.invert()
-    if not mesh.is_winding_consistent or mesh.volume <= 1e-9 * mesh.scale**3:
-        raise UserError(f"encloses no volume ({mesh.volume:.3g} in a box of diagonal {mesh.scale:.3g})")
     return mesh
 
 

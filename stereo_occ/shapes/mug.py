@@ -26,7 +26,7 @@ def mug(rng: Generator, object_id: str) -> Shape:
     cup = vessel(
         profile_N2,
         thickness,
-        floor=thickness * rng.uniform(0.9, 2.0) + (0.05 if body == "footed" else 0),
+        floor=thickness * rng.uniform(1.0, 2.0) + (0.05 if body == "footed" else 0),
         base_radius=rng.uniform(0.01, 0.08),
         cavity_radius=rng.uniform(0.02, 0.12),
         rim=rng.uniform(0.2, 0.45),

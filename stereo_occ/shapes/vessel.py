@@ -51,7 +51,7 @@ def vessel(
     Args:
         profile_N2: (radius, height), heights from 0 to about 1.
         thickness: of the wall, normal to the profile.
-        floor: thickness of the floor.
+        floor: thickness of the floor, not below that of the wall.
         base_radius: rounding of the outer base edge.
         cavity_radius: rounding between floor and wall inside.
         rim: rounding of the rim over the wall thickness, below 0.5.
@@ -74,7 +74,7 @@ def vessel(
     wall = hull - cavity - _beyond(end, along, thickness)
     if lip is not None:
         wall += lip
-    return Vessel(solids.rounded(wall, outward=rim * thickness), hull, middle, floor)
+    return Vessel(solids.rounded(wall, outward=rim * thickness), hull, middle, cavity.bounds()[1])
 
 
 def _beyond(end: Points, along: Points, thickness: float) -> CrossSection:
