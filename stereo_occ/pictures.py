@@ -38,7 +38,7 @@ def picture(mesh: Trimesh, rig: StereoRig) -> NDArray[np.uint8]:
     with StereoRenderer() as renderer:
         renderer.load(mesh)
         images = renderer.render(resized(rig, PANEL), np.eye(4), _LOOK)
-    return images.rgb_2HW3[0]
+    return np.asarray(images.rgb_2HW3[0])
 
 
 def resized(rig: StereoRig, side: int) -> StereoRig:

@@ -66,8 +66,7 @@ class Camera:
         """Pixels ``(N, 2)`` at depths ``(N,)`` metres to rig-frame points ``(N, 3)``; inverse of :meth:`project`."""
         homogeneous_N3 = np.concatenate([pixels_N2, np.ones_like(pixels_N2[..., :1])], axis=-1)
         camera_N3: NDArray[np.float64] = homogeneous_N3 @ np.linalg.inv(self.K).T * depth_N[..., None]
-        rig_from_camera: NDArray[np.float64] = np.linalg.inv(self.camera_from_rig)
-        return transform_points(camera_N3, rig_from_camera)
+        return transform_points(camera_N3, np.linalg.inv(self.camera_from_rig).astype(np.float64))
 
     @property
     def center(self) -> NDArray[np.float64]:
