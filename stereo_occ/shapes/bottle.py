@@ -1,14 +1,12 @@
 """Procedural bottles: a body with a neck, a closure and sometimes a handle; mostly solid."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from manifold3d import CrossSection, Manifold
 from numpy.random import Generator
 
-from stereo_occ.shapes import bottle_tops, solids
+from stereo_occ.shapes import bottle_tops, solids, warps
 from stereo_occ.shapes.bottle_profiles import Silhouette, silhouette
-from stereo_occ.shapes.curves import Points
+from stereo_occ.shapes.bottle_sections import draw_section
 from stereo_occ.shapes.handle import HANDLES, SECTIONS, Handle, handle_tube
 from stereo_occ.shapes.shape import Shape
 from stereo_occ.shapes.vessel import OPEN, Vessel, wall_fraction
@@ -33,45 +31,12 @@ CLOSURES: dict[str, dict[str, float]] = {
     "squeeze": {"nozzle": 0.8, "cap": 0.2},
 }
 
-#: Odds of a round, an oval and a rounded rectangular section.
-SECTION_ODDS = {
-    "wine": (0.92, 0.0, 0.08),
-    "soda": (0.88, 0.0, 0.12),
-    "flask": (0.0, 0.45, 0.55),
-    "jar": (0.75, 0.0, 0.25),
-    "jug": (0.35, 0.2, 0.45),
-    "spray": (0.35, 0.3, 0.35),
-    "squeeze": (0.45, 0.4, 0.15),
-}
-
-
-@dataclass(frozen=True)
-class Section:
-    """The horizontal section of the body: a superellipse that turns round between shoulder and neck."""
-
-    name: str
-    exponent: float
-    aspect: float
-    facets: int
-
-    def turned(self, section: CrossSection, outline: Silhouette) -> Manifold:
-        """The solid with a lathe section."""
-        solid = solids.lathe(section, self.facets or 48)
-        if self.exponent == 2 and self.aspect == 1:
-            return solid
-
-        def weight(height: Points) -> Points:
-            t = np.clip((outline.neck - height) / (outline.neck - 0.8 * outline.shoulder), 0, 1)
-            return t * t * (3 - 2 * t)
-
-        return solids.with_section(solid, self.exponent, self.aspect, weight)
-
 
 def bottle(rng: Generator, object_id: str) -> Shape:
     """A random bottle, not yet in the object frame."""
     kind = str(rng.choice(list(KIND_ODDS), p=list(KIND_ODDS.values())))
     outline = silhouette(rng, kind)
-    section = _section(rng, kind)
+    section = draw_section(rng, kind)
     closure = str(rng.choice(list(CLOSURES[kind]), p=list(CLOSURES[kind].values())))
     hollow = rng.random() < 0.22
     thickness = float(np.clip(wall_fraction(rng), 0.0125, 0.4 * outline.neck_radius)) if hollow else 0.0
@@ -92,7 +57,7 @@ def bottle(rng: Generator, object_id: str) -> Shape:
             solid, handle_solid = solid + (tube - section.turned(body.middle, outline)), tube - hull
         parts["handle"] = solids.trimesh_of(handle_solid)
     if kind == "squeeze" and rng.random() < 0.2:
-        solid = solids.leaning(solid, rng.uniform(0.85, 1.0) * outline.shoulder, rng.uniform(0.3, 0.8))
+        solid = warps.leaning(solid, rng.uniform(0.85, 1.0) * outline.shoulder, rng.uniform(0.3, 0.8))
     parts["neck"] = solids.trimesh_of(solids.slab(solid, outline.neck, 1.0))
     parts["floor"] = solids.trimesh_of(solids.slab(solid, -1.0, body.floor))
     mesh = solids.trimesh_of(solid)
@@ -131,17 +96,6 @@ def _body(rng: Generator, outline: Silhouette, closure: str, thickness: float) -
     wall = hull - solids.rounded(cavity, outward=0.2 * thickness)
     wall = solids.rounded(wall, outward=0.35 * thickness)
     return Vessel(wall, hull, solids.offset(tall, -thickness / 2), floor)
-
-
-def _section(rng: Generator, kind: str) -> Section:
-    shape = str(rng.choice(("round", "oval", "rounded rectangle"), p=SECTION_ODDS[kind]))
-    if shape == "oval":
-        return Section(shape, rng.uniform(2.0, 2.6), rng.uniform(0.5, 0.85), 0)
-    if shape == "rounded rectangle":
-        flat = rng.uniform(0.4, 0.75) if kind == "flask" else rng.uniform(0.55, 1.0)
-        return Section(shape, rng.uniform(3.5, 9.0), flat, 0)
-    facets = int(rng.choice((6, 8, 10, 12))) if rng.random() < 0.06 else 0
-    return Section(f"{facets} facets" if facets else shape, 2.0, 1.0, facets)
 
 
 def _handle_tube(rng: Generator, kind: str, outline: Silhouette, thickness: float) -> Manifold:

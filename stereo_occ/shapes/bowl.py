@@ -3,7 +3,7 @@
 from manifold3d import CrossSection, Manifold
 from numpy.random import Generator
 
-from stereo_occ.shapes import curves, solids
+from stereo_occ.shapes import curves, solids, warps
 from stereo_occ.shapes.curves import Points
 from stereo_occ.shapes.shape import Shape
 from stereo_occ.shapes.vessel import vessel, wall_fraction
@@ -56,13 +56,13 @@ def _turned(rng: Generator, kind: str, wall: CrossSection) -> tuple[Manifold, st
         return solids.lathe(wall, facets), f"{facets} facets"
     solid = solids.lathe(wall, 64, tolerance=1.2e-3)
     if kind == "oval":
-        return solids.with_section(solid, rng.uniform(2.0, 2.5), rng.uniform(0.6, 0.88)), "oval"
+        return warps.with_section(solid, rng.uniform(2.0, 2.5), rng.uniform(0.6, 0.88)), "oval"
     if kind == "rounded square":
-        solid = solids.with_section(solid, rng.uniform(2.8, 7.0), rng.uniform(0.75, 1.0))
-        return (solids.peaked(solid, rng.uniform(0.08, 0.3)) if style < 0.35 else solid), "rounded square"
+        solid = warps.with_section(solid, rng.uniform(2.8, 7.0), rng.uniform(0.75, 1.0))
+        return (warps.peaked(solid, rng.uniform(0.08, 0.3)) if style < 0.35 else solid), "rounded square"
     if style < 0.16 and kind != "incurved":
         lobes = int(rng.integers(5, 13))
-        return solids.scalloped(solid, lobes, rng.uniform(0.1, 0.4) / lobes), "scalloped"
+        return warps.scalloped(solid, lobes, rng.uniform(0.1, 0.4) / lobes), "scalloped"
     return solid, "round"
 
 
@@ -82,7 +82,7 @@ def _profile(rng: Generator, kind: str) -> Points:
         cup = curves.bezier([[base, 0], [well, 0], [well, 0.4 * brim], [well, brim]], 20)
         return curves.filleted([*cup, [1, brim * rng.uniform(1.0, 1.15)]], 0.06)
     if kind == "incurved":
-        inward = rng.uniform(0.7, 0.9)
+        height, inward = rng.uniform(0.55, 1.0), rng.uniform(0.7, 0.9)
         return curves.bezier([[base, 0], [1.25, 0], [1.15, height * 0.9], [inward, height]], 32)
     if kind == "footed":
         base = rng.uniform(0.3, 0.5)

@@ -57,3 +57,9 @@ def smallest_bend(points_N2: Points) -> float:
     area = np.abs(ab[:, 0] * bc[:, 1] - ab[:, 1] * bc[:, 0]) / 2
     sides = np.linalg.norm(ab, axis=1) * np.linalg.norm(bc, axis=1) * np.linalg.norm(ca, axis=1)
     return float((sides / (4 * area + 1e-12)).min())
+
+
+def superellipse(cos_N: Points, sin_N: Points, exponent: float) -> tuple[Points, Points]:
+    """The point of the unit superellipse |x|^n + |y|^n = 1 in each direction given by its cosine and sine."""
+    length_N = (np.abs(cos_N) ** exponent + np.abs(sin_N) ** exponent) ** (-1 / exponent)
+    return cos_N * length_N, sin_N * length_N

@@ -4,7 +4,7 @@ import numpy as np
 from manifold3d import CrossSection, Manifold
 from numpy.random import Generator
 
-from stereo_occ.shapes import curves, solids
+from stereo_occ.shapes import curves, solids, warps
 from stereo_occ.shapes.curves import Points
 from stereo_occ.shapes.handle import HANDLES, SECTIONS, Handle, handle_tube
 from stereo_occ.shapes.shape import Shape
@@ -38,7 +38,7 @@ def mug(rng: Generator, object_id: str) -> Shape:
 
     def turned(section: CrossSection, tolerance: float) -> Manifold:
         solid = solids.lathe(section, facets or 52, tolerance)
-        return solids.with_section(solid, exponent, 1.0) if exponent > 2 else solid
+        return warps.with_section(solid, exponent, 1.0) if exponent > 2 else solid
 
     solid, parts = turned(cup.wall, 6e-4), {}
     if handle:

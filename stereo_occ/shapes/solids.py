@@ -1,20 +1,16 @@
-"""Solids of the procedural objects, by manifold3d: lathed profiles, swept tubes, warped sections.
+"""Solids of the procedural objects, by manifold3d: lathed profiles and swept tubes.
 
 While an object is built its axis is +Z and its handle points to +X; :func:`trimesh_of` turns +Z into +Y,
 which is up in the object frame.
 """
-
-from collections.abc import Callable
 
 import numpy as np
 from manifold3d import CrossSection, FillRule, JoinType, Manifold, Mesh64
 from numpy.typing import NDArray
 from trimesh import Trimesh
 
+from stereo_occ.shapes import curves
 from stereo_occ.shapes.curves import Points
-
-#: Large compared with any object: they are built with sides of about one.
-FAR = 10.0
 
 
 def section_of(profile_N2: Points) -> CrossSection:
@@ -77,7 +73,7 @@ def sweep(path_N2: Points, half_sizes_N2: Points, exponent: float = 2.0, sides: 
     tangent_N2 /= np.linalg.norm(tangent_N2, axis=1, keepdims=True)
     normal_N2 = tangent_N2[:, ::-1] * (-1.0, 1.0)
     angle = np.linspace(0, 2 * np.pi, sides, endpoint=False)
-    across_K, along_K = superellipse(np.cos(angle), np.sin(angle), exponent)
+    across_K, along_K = curves.superellipse(np.cos(angle), np.sin(angle), exponent)
     rings_NK3 = np.empty((len(path_N2), sides, 3))
     rings_NK3[..., [0, 2]] = (
         path_N2[:, None] + normal_N2[:, None] * (half_sizes_N2[:, :1] * across_K)[..., None]
@@ -101,75 +97,6 @@ def skin(rings_NK3: NDArray[np.float64]) -> Manifold:
     ]
     vertices = np.concatenate([rings_NK3.reshape(-1, 3), rings_NK3[[0, -1]].mean(axis=1)])
     return Manifold(Mesh64(vertices, np.concatenate(triangles).astype(np.uint64)))
-
-
-def superellipse(
-    cos_N: NDArray[np.float64], sin_N: NDArray[np.float64], exponent: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The point of the unit superellipse |x|^n + |y|^n = 1 in each direction given by its cosine and sine."""
-    length_N = (np.abs(cos_N) ** exponent + np.abs(sin_N) ** exponent) ** (-1 / exponent)
-    return cos_N * length_N, sin_N * length_N
-
-
-def with_section(
-    solid: Manifold, exponent: float, aspect: float, weight: Callable[[Points], Points] | None = None
-) -> Manifold:
-    """A lathed solid whose round section becomes a superellipse, with the same width along X.
-
-    Args:
-        solid: around +Z.
-        exponent: 2 is an ellipse; 4 and more a rounded rectangle.
-        aspect: depth along Y over width along X.
-        weight: from heights to how far the section is changed there, 0 (round) to 1; everywhere 1 by default.
-    """
-
-    def warp(points_N3: NDArray[np.float64]) -> NDArray[np.float64]:
-        x, y, z = points_N3.T
-        radius = np.hypot(x, y)
-        on_axis = radius < 1e-12
-        cos, sin = np.where(on_axis, 1, x) / np.where(on_axis, 1, radius), y / np.where(on_axis, 1, radius)
-        new_cos, new_sin = superellipse(cos, sin, exponent)
-        share = np.ones_like(z) if weight is None else weight(z)
-        new_x = x + share * (new_cos * radius - x)
-        new_y = y + share * (aspect * new_sin * radius - y)
-        return np.stack([new_x, new_y, z], axis=1)
-
-    return solid.warp_batch(warp)
-
-
-def leaning(solid: Manifold, start: float, slope: float) -> Manifold:
-    """The solid sheared towards +X above a height, smoothly up to a slope at its top."""
-    top = solid.bounding_box()[5]
-
-    def warp(points_N3: NDArray[np.float64]) -> NDArray[np.float64]:
-        x, y, z = points_N3.T
-        return np.stack([x + slope * np.maximum(z - start, 0) ** 2 / (2 * (top - start)), y, z], axis=1)
-
-    return solid.warp_batch(warp)
-
-
-def scalloped(solid: Manifold, lobes: int, depth: float) -> Manifold:
-    """A lathed solid whose radius waves around the axis, by nothing at its base and ``depth`` at its top."""
-    base, top = solid.bounding_box()[2], solid.bounding_box()[5]
-
-    def warp(points_N3: NDArray[np.float64]) -> NDArray[np.float64]:
-        x, y, z = points_N3.T
-        wave = 1 + depth * np.cos(lobes * np.arctan2(y, x)) * (z - base) / (top - base)
-        return np.stack([x * wave, y * wave, z], axis=1)
-
-    return solid.warp_batch(warp)
-
-
-def peaked(solid: Manifold, rise: float) -> Manifold:
-    """A lathed solid stretched upwards in its four diagonal directions, by ``rise`` times the height."""
-    base = solid.bounding_box()[2]
-
-    def warp(points_N3: NDArray[np.float64]) -> NDArray[np.float64]:
-        x, y, z = points_N3.T
-        diagonal = np.sin(2 * np.arctan2(y, x)) ** 2
-        return np.stack([x, y, z + rise * diagonal * np.maximum(z - base, 0) ** 2], axis=1)
-
-    return solid.warp_batch(warp)
 
 
 def slab(solid: Manifold, low: float, high: float) -> Manifold:

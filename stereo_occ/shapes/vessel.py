@@ -31,8 +31,8 @@ class Vessel:
 
 
 def wall_fraction(rng: Generator) -> float:
-    """Wall thickness over the object's longest side: 1.1 to 6 %, two thirds of it between 2 and 4 %."""
-    return float(np.clip(rng.lognormal(np.log(0.028), 0.34), 0.011, 0.06))
+    """Wall thickness over the object's longest side: 1.1 to 5.6 %, two thirds of it between 2 and 4 %."""
+    return float(np.clip(rng.lognormal(np.log(0.028), 0.34), 0.0115, 0.056))
 
 
 def vessel(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stereo_occ.shapes import curves, solids
+from stereo_occ.shapes import curves, solids, warps
 
 
 def test_bezier_of_a_straight_control_polygon_is_the_straight_line():
@@ -70,16 +70,16 @@ def test_sweep_along_a_straight_line_is_a_cylinder_with_outward_faces():
 
 def test_superelliptic_section_keeps_the_width_and_scales_the_depth():
     can = solids.lathe(solids.section_of(np.array([[0.5, 0.0], [0.5, 1.0]])), 400)
-    ellipse = solids.with_section(can, exponent=2.0, aspect=0.6)
+    ellipse = warps.with_section(can, exponent=2.0, aspect=0.6)
     assert ellipse.volume() == pytest.approx(np.pi * 0.5 * 0.3, rel=1e-3)
-    boxy = solids.with_section(can, exponent=80.0, aspect=0.6)
+    boxy = warps.with_section(can, exponent=80.0, aspect=0.6)
     assert boxy.volume() == pytest.approx(1.0 * 0.6, rel=0.02)
     np.testing.assert_allclose(boxy.bounding_box(), [-0.5, -0.3, 0, 0.5, 0.3, 1], atol=1e-3)
 
 
 def test_section_weight_zero_leaves_the_solid_round():
     can = solids.lathe(solids.section_of(np.array([[0.5, 0.0], [0.5, 1.0]])), 40)
-    same = solids.with_section(can, 6.0, 0.5, weight=np.zeros_like)
+    same = warps.with_section(can, 6.0, 0.5, weight=np.zeros_like)
     assert same.volume() == pytest.approx(can.volume(), rel=1e-12)
 
 
@@ -93,3 +93,21 @@ def test_mesh_has_y_up_and_keeps_x_and_the_volume():
 def test_slab_is_the_bounding_box_between_two_heights():
     can = solids.lathe(solids.section_of(np.array([[0.5, 0.0], [0.5, 1.0]])), 40)
     np.testing.assert_allclose(solids.slab(can, -3, 0.25).bounding_box(), [-0.5, -0.5, 0, 0.5, 0.5, 0.25])
+
+
+def test_leaning_shears_only_what_is_above_and_keeps_the_volume():
+    can = solids.lathe(solids.section_of(np.array([[0.5, 0.0], [0.5, 1.0]])), 40).refine(8)
+    bent = warps.leaning(can, start=0.4, slope=0.5)
+    assert bent.volume() == pytest.approx(can.volume(), rel=1e-6)
+    np.testing.assert_allclose(bent.trim_by_plane((0, 0, -1), -0.4).bounding_box()[3], 0.5, atol=1e-3)
+    np.testing.assert_allclose(bent.bounding_box()[3], 0.5 + 0.5 * 0.6 / 2, atol=1e-3)
+
+
+def test_scallops_wave_the_rim_and_not_the_base_and_peaks_lift_the_corners():
+    can = solids.lathe(solids.section_of(np.array([[0.5, 0.0], [0.5, 1.0]])), 80)
+    x, y, z = warps.scalloped(can, lobes=5, depth=0.1).to_mesh64().vert_properties[:, :3].T
+    radius = np.hypot(x, y)
+    rim = radius[(z > 0.99) & (radius > 0.1)]
+    np.testing.assert_allclose([rim.min(), rim.max()], [0.45, 0.55], rtol=5e-3)
+    np.testing.assert_allclose(radius[(z < 0.01) & (radius > 0.1)], 0.5, rtol=2e-3)
+    assert warps.peaked(can, rise=0.2).bounding_box()[5] == pytest.approx(1.2, rel=1e-3)
