@@ -126,9 +126,15 @@ class Shard:
     def _damaged(self, error: Exception) -> UserError:
         return UserError(f"{self.path}: cannot read the shard ({error}); delete it and render again")
 
+    @cached_property
+    def _opened(self) -> dict[str, h5py.Dataset]:
+        return {}
+
     def _read(self, name: str, selection: Any = ...) -> NDArray[Any]:
         try:
-            return np.asarray(self._file[name][selection])
+            if name not in self._opened:  # opening a data set takes longer than reading one view
+                self._opened[name] = self._file[name]
+            return np.asarray(self._opened[name][selection])
         except (OSError, KeyError) as error:
             raise self._damaged(error) from error
 
@@ -143,16 +149,19 @@ class Shard:
 
     def close(self) -> None:
         """Close the file; the next access opens it again."""
-        if "_file" in self.__dict__:
+        if "_file" in vars(self):
             self._file.close()
-            del self._file
+        self.__dict__ = self.__getstate__()
 
-    @property
+    def __getstate__(self) -> dict[str, Any]:
+        return {"path": self.path}
+
+    @cached_property
     def category(self) -> str:
         """The object's category."""
         return str(self._file.attrs["category"])
 
-    @property
+    @cached_property
     def object_id(self) -> str:
         """The object's name, unique within its data set."""
         return str(self._file.attrs["object_id"])
