@@ -9,6 +9,9 @@ from stereo_occ.geometry.rotations import random_rotations
 
 ATTEMPTS = 10_000
 
+# A unit diagonal at the fixation point of the paper's rig touches the views' borders, and must not fail by rounding.
+ROUNDING = 1e-9  # metres
+
 
 def draw_pose(kind: str, diagonal: tuple[float, float], rig: StereoRig, rng: np.random.Generator) -> Pose:
     """A pose with uniform rotation, at the fixation point (``paper``) or anywhere that stays visible (``free``).
@@ -25,7 +28,7 @@ def draw_pose(kind: str, diagonal: tuple[float, float], rig: StereoRig, rng: np.
         return Pose(rotation, scale, np.zeros(3))
     for _ in range(ATTEMPTS):
         center = rng.uniform(-0.5, 0.5, 3) * (1 - scale)
-        if all(camera.clearance(center) >= scale / 2 for camera in rig.cameras):
+        if all(camera.clearance(center) >= scale / 2 - ROUNDING for camera in rig.cameras):
             return Pose(rotation, scale, center)
     raise UserError(
         f"placement=free: no place for an object of diagonal {scale:.2f} m is inside both views; "

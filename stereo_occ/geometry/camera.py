@@ -145,11 +145,13 @@ def look_at_origin(angle: float, distance: float) -> NDArray[np.float64]:
 
 def check_rigid(matrix_44: NDArray[np.float64], name: str) -> None:
     """Raise :class:`UserError` unless the 4x4 matrix is a rotation and a translation, to 1e-5."""
-    rotation = matrix_44[:3, :3]
     if matrix_44.shape != (4, 4) or not np.isfinite(matrix_44).all():
         raise UserError(
             f"{name}: must be a finite 4x4 matrix, got shape {matrix_44.shape}: {matrix_44.tolist()}"
         )
+    if not np.allclose(matrix_44[3], [0, 0, 0, 1], atol=1e-5):
+        raise UserError(f"{name}: the last row must be [0, 0, 0, 1], got {matrix_44[3].tolist()}")
+    rotation = matrix_44[:3, :3]
     if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-5) or np.linalg.det(rotation) < 0:
         raise UserError(
             f"{name}: the upper left 3x3 block must be a rotation (orthonormal, determinant +1), "
