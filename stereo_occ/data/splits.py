@@ -41,10 +41,15 @@ def split_views(views: int, fractions: Sequence[float], subset: str) -> range:
 
 
 def subset_sizes(count: int, fractions: Sequence[float], what: str) -> list[int]:
-    """Sizes of train, val and test that add up to ``count``; see :func:`split_objects`."""
-    held_out = [max(1, round(count * fraction)) if fraction > 0 else 0 for fraction in fractions[1:]]
-    if fractions[0] > 0 and count <= sum(held_out):
+    """Sizes of train, val and test that add up to ``count``; see :func:`split_objects`.
+
+    The largest subset takes what rounding leaves over.
+    """
+    needed = sum(fraction > 0 for fraction in fractions)
+    if count < needed:
         raise UserError(
-            f"{what}: {count} are too few to divide into train, val and test; have at least {sum(held_out) + 1}"
+            f"{what}: {count} are too few to divide into train, val and test; have at least {needed}"
         )
-    return [count - sum(held_out), *held_out]
+    sizes = [max(1, round(count * fraction)) if fraction > 0 else 0 for fraction in fractions]
+    sizes[int(np.argmax(fractions))] += count - sum(sizes)
+    return sizes
