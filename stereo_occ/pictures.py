@@ -12,7 +12,7 @@ from stereo_occ.render.stereo import StereoRenderer
 
 PANEL = 192  # pixels
 
-_LOOK = Appearance(
+LOOK = Appearance(
     light_from_L3=np.array([[-0.5, 0.7, 0.5], [0.8, 0.2, 0.5]]),
     light_color_L3=np.array([[1.7, 1.7, 1.7], [0.7, 0.7, 0.7]]),
     ambient=0.15,
@@ -37,7 +37,7 @@ def picture(mesh: Trimesh, rig: StereoRig) -> NDArray[np.uint8]:
         return np.full((PANEL, PANEL, 3), 255, dtype=np.uint8)
     with StereoRenderer() as renderer:
         renderer.load(mesh)
-        images = renderer.render(resized(rig, PANEL), np.eye(4), _LOOK)
+        images = renderer.render(resized(rig, PANEL), np.eye(4), LOOK)
     return np.asarray(images.rgb_2HW3[0])
 
 

@@ -6,6 +6,7 @@ process.
 """
 
 import importlib
+import logging
 import os
 import sys
 from contextlib import suppress
@@ -35,6 +36,7 @@ def import_pyrender() -> Any:
             "pip install --no-deps 'PyOpenGL>=3.1.10'"
         )
     os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
+    logging.getLogger("OpenGL").setLevel(logging.WARNING)
     if not hasattr(np, "infty"):  # NumPy 2 dropped the name, pyrender.Mesh.bounds uses it
         vars(np)["infty"] = np.inf
     with suppress(ImportError):  # its LLVM crashes when it is loaded after Mesa's, as torch would do later
@@ -56,6 +58,7 @@ def process_renderer(width: int, height: int) -> Any:
         pyrender = import_pyrender()
         try:
             _renderer = pyrender.OffscreenRenderer(width, height)
+            _renderer._renderer = _single_sampled(pyrender.renderer)(width, height)
         except Exception as error:
             raise _no_gl(error) from error
         _owner = os.getpid()
@@ -65,6 +68,21 @@ def process_renderer(width: int, height: int) -> Any:
         )
     _renderer.viewport_width, _renderer.viewport_height = width, height
     return _renderer
+
+
+def _single_sampled(module: Any) -> Any:
+    """pyrender's renderer without multisampling, which takes most of the time on a software rasteriser."""
+
+    class SingleSampled(module.Renderer):  # type: ignore[misc]
+        def _configure_main_framebuffer(self) -> None:
+            multisampled = module.glRenderbufferStorageMultisample
+            module.glRenderbufferStorageMultisample = lambda target, _, *size: multisampled(target, 0, *size)
+            try:
+                super()._configure_main_framebuffer()
+            finally:
+                module.glRenderbufferStorageMultisample = multisampled
+
+    return SingleSampled
 
 
 def _no_gl(error: Exception) -> UserError:
