@@ -79,15 +79,16 @@ class DilatedResNet(ImageEncoder):
 
     def forward(self, image_BCHW: Tensor) -> Tensor:
         """See :class:`ImageEncoder`."""
-        x_BCHW = self.stem(2 * image_BCHW - 1)  # 1/2
+        x_BCHW: Tensor = self.stem(2 * image_BCHW - 1)  # 1/2
         maps = []  # 1/4, 1/8, 1/16
         for stage in self.stages:
             x_BCHW = stage(x_BCHW)
             maps.append(x_BCHW)
         if self.merges is None:
-            return torch.as_tensor(x_BCHW)
+            return x_BCHW
         fine, middle, coarse = (merge(features) for merge, features in zip(self.merges, maps, strict=True))
-        return torch.as_tensor(fine + _double(middle + _double(coarse)))
+        merged_BCHW: Tensor = fine + _double(middle + _double(coarse))
+        return merged_BCHW
 
 
 class ResNet18(ImageEncoder):
@@ -125,7 +126,8 @@ class ResNet18(ImageEncoder):
 
     def forward(self, image_BCHW: Tensor) -> Tensor:
         """See :class:`ImageEncoder`."""
-        return torch.as_tensor(self.layers((image_BCHW - self.mean_C11) / self.std_C11))
+        features_BCHW: Tensor = self.layers((image_BCHW - self.mean_C11) / self.std_C11)
+        return features_BCHW
 
 
 def _stage(in_width: int, width: int, dilations: Iterable[int]) -> nn.Sequential:

@@ -1,0 +1,106 @@
+"""Parameters and multiply-accumulates of every shipped model, as a Markdown table.
+
+    python benchmarks/model_cost.py
+
+Multiply-accumulates (MMAC, millions) are those of one sample's forward pass, counted by torch from the operators that
+run: the encoder's share is ``encode``, the decoder's is ``decode`` of the stated query points. Convolution taps that
+can only meet padding do not run and are not counted (DilatedConv).
+"""
+
+from dataclasses import dataclass
+
+import torch
+from hydra import compose, initialize_config_dir
+from omegaconf import DictConfig
+from torch.utils.flop_counter import FlopCounterMode
+
+from stereo_occ.checkpoint import plain
+from stereo_occ.config import register_schemas
+from stereo_occ.data.prepare import build_rig
+from stereo_occ.geometry.camera import StereoRig
+from stereo_occ.models.base import OccupancyModel, StereoViews
+from stereo_occ.models.build import COST_VOLUMES, build_model
+from stereo_occ.paths import conf_dir
+
+MODELS = {
+    "mono, resnet18": ["model=mono", "model.encoder.weights=null"],
+    "mono, dilated_resnet": ["model=mono", "model/encoder=dilated_resnet"],
+    **{f"stereo, {name}": ["model=stereo", f"model/cost_volume={name}"] for name in COST_VOLUMES},
+    "stereo, correlation, resnet18": [
+        "model=stereo",
+        "model/encoder=resnet18",
+        "model.encoder.weights=null",
+    ],
+}
+
+
+@dataclass(frozen=True)
+class Size:
+    """What a row is measured at."""
+
+    image_side: int
+    disparities: int
+    hidden: int
+    points: int
+
+    def overrides(self) -> list[str]:
+        """Overrides of ``scale``."""
+        return [
+            f"scale.image_side={self.image_side}",
+            f"scale.disparities={self.disparities}",
+            f"scale.decoder_hidden={self.hidden}",
+            "scale.decoder_blocks=5",
+        ]
+
+
+SIZES = (Size(64, 8, 128, 512), Size(128, 16, 128, 512), Size(224, 32, 256, 2048))
+
+
+def random_views(rig: StereoRig) -> StereoViews:
+    """One pair of noise images with the rig's calibration."""
+    left, right = torch.rand(2, 1, 3, rig.left.height, rig.left.width)
+    K = torch.stack([torch.tensor(camera.K, dtype=torch.float32) for camera in rig.cameras])
+    extrinsics = torch.stack(
+        [torch.tensor(camera.camera_from_rig, dtype=torch.float32) for camera in rig.cameras]
+    )
+    return StereoViews(left, right, K[None], extrinsics[None])
+
+
+@torch.no_grad()
+def mmac(model: OccupancyModel, rig: StereoRig, points: int) -> tuple[float, float]:
+    """Millions of multiply-accumulates of encoding one pair and of decoding ``points`` points."""
+    views = random_views(rig)
+    with FlopCounterMode(display=False) as encoding:
+        code = model.eval().encode(views)
+    with FlopCounterMode(display=False) as decoding:
+        model.decode(code, torch.rand(1, points, 3) - 0.5)
+    return encoding.get_total_flops() / 2e6, decoding.get_total_flops() / 2e6
+
+
+def row(name: str, size: Size, cfg: DictConfig) -> str:
+    """One line of the table."""
+    rig = build_rig(cfg.rig, size.image_side)
+    model = build_model(plain(cfg.model), rig)
+    encode, decode = mmac(model, rig, size.points)
+    parameters = sum(p.numel() for p in model.parameters()) / 1e6
+    cells = getattr(getattr(model, "cost_volume", None), "disparities", None)
+    span = f"{cells[0]} .. {cells[-1]}" if cells else ""
+    return (
+        f"| {name} | {size.image_side} | {span} | {size.hidden} | {size.points:,} "
+        f"| {parameters:.2f} | {encode:,.0f} | {decode:,.0f} |"
+    )
+
+
+def main() -> None:
+    """Print the table."""
+    register_schemas()
+    print("| model | side | cells | hidden | points | parameters, M | encode, MMAC | decode, MMAC |")
+    print("|---|---|---|---|---|---|---|---|")
+    with initialize_config_dir(str(conf_dir()), version_base="1.3"):
+        for name, overrides in MODELS.items():
+            for size in SIZES:
+                print(row(name, size, compose("train", [*overrides, *size.overrides()])))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,144 @@
+"""Image encoders."""
+
+from urllib.error import URLError
+
+import pytest
+import torch
+from torch.nn.functional import conv2d
+from torchvision.models import ResNet18_Weights, resnet18
+
+from stereo_occ.errors import UserError
+from stereo_occ.models.encoders import DilatedResNet, ResNet18
+from stereo_occ.models.residual import DilatedConv, ResidualBlock
+
+DILATED = {"channels": 16, "widths": [32, 64, 128], "blocks": [3, 4, 8], "dilations": [1, 2, 5, 9]}
+WEIGHTS_FILE = "resnet18-f37072fd.pth"
+
+
+@pytest.fixture
+def torch_cache(tmp_path, monkeypatch):
+    """An empty torch cache and no network."""
+
+    def no_network(*args: object, **kwargs: object):
+        raise URLError("no network")
+
+    monkeypatch.setattr(torch.hub, "download_url_to_file", no_network)
+    directory = torch.hub.get_dir()
+    torch.hub.set_dir(tmp_path)
+    (tmp_path / "checkpoints").mkdir()
+    yield tmp_path / "checkpoints"
+    torch.hub.set_dir(directory)
+
+
+@pytest.mark.parametrize(
+    ("encoder", "shape"),
+    [
+        (DilatedResNet(stride=4, **DILATED), (16, 16, 16)),
+        (DilatedResNet(stride=None, **DILATED), (128, 4, 4)),
+        (ResNet18(stride=4, weights=None, load_weights=True), (64, 16, 16)),
+        (ResNet18(stride=16, weights=None, load_weights=True), (256, 4, 4)),
+        (ResNet18(stride=None, weights=None, load_weights=True), (512, 2, 2)),
+    ],
+)
+def test_features_are_what_the_attributes_say(encoder, shape):
+    features = encoder(torch.rand(2, 3, 64, 64))
+    assert features.shape == (2, *shape)
+    assert (encoder.channels, 64 // encoder.stride) == shape[:2]
+
+
+@pytest.mark.parametrize(
+    ("encoder", "step"),
+    [
+        (DilatedResNet(stride=4, channels=16, widths=[8, 8, 8], blocks=[1, 1, 1], dilations=[1]), 16),
+        (ResNet18(stride=4, weights=None, load_weights=True), 4),
+    ],
+)
+def test_an_image_shifted_by_pixels_shifts_its_features_by_pixels_over_the_stride(encoder, step):
+    encoder.eval()
+    strip = torch.rand(1, 3, 32, 336, generator=torch.Generator().manual_seed(0))
+    with torch.no_grad():
+        left, right = encoder(strip[..., :320]), encoder(strip[..., step : step + 320])
+    cells = step // 4
+    torch.testing.assert_close(left[..., 30 + cells : 50 + cells], right[..., 30:50], atol=1e-4, rtol=1e-4)
+    assert (left[..., 30:50] - right[..., 30:50]).abs().max() > 0.01
+
+
+def test_dilated_stages_have_the_papers_blocks():
+    encoder = DilatedResNet(stride=4, **DILATED)
+    dilations = [
+        [block.conv0.dilation[0] for block in stage if isinstance(block, ResidualBlock)]
+        for stage in encoder.stages
+    ]
+    assert dilations == [[1, 1, 1], [1, 1, 1, 1], [1, 2, 5, 9, 1, 2, 5, 9]]
+
+
+@pytest.mark.parametrize(("side", "dilation"), [(4, 9), (4, 4), (4, 3), (6, 5), (12, 5)])
+def test_leaving_out_taps_that_meet_padding_changes_nothing(side, dilation):
+    layer = DilatedConv(5, 7, dilation)
+    x = torch.randn(2, 5, side, side)
+    expected = conv2d(x, layer.weight, padding=dilation, dilation=dilation)
+    torch.testing.assert_close(layer(x), expected)
+    gradient, expected_gradient = (
+        torch.autograd.grad(y.square().sum(), layer.weight)[0] for y in (layer(x), expected)
+    )
+    torch.testing.assert_close(gradient, expected_gradient)
+
+
+def test_a_residual_block_without_last_convolution_is_its_shortcut():
+    block = ResidualBlock(4, 4, 2, torch.relu)
+    torch.nn.init.zeros_(block.conv1.weight)
+    x = torch.randn(2, 4, 6, 6)
+    torch.testing.assert_close(block(x), x)
+
+
+def test_images_from_scratch_are_centred():
+    for encoder in (DilatedResNet(stride=4, **DILATED), ResNet18(stride=4, weights=None, load_weights=True)):
+        first = next(m for m in encoder.modules() if isinstance(m, torch.nn.Conv2d))
+        seen = []
+        first.register_forward_hook(lambda module, inputs, output, seen=seen: seen.append(inputs[0]))
+        image = torch.rand(2, 3, 32, 32)
+        encoder(image)
+        torch.testing.assert_close(seen[0], 2 * image - 1)
+
+
+def test_pretrained_resnet_is_torchvisions_network_on_normalised_images(torch_cache):
+    reference = resnet18()
+    torch.save(reference.state_dict(), torch_cache / WEIGHTS_FILE)
+    encoder = ResNet18(stride=None, weights="IMAGENET1K_V1", load_weights=True).eval()
+    reference.eval().fc = torch.nn.Identity()
+    images = torch.rand(2, 3, 224, 224)
+    transform = ResNet18_Weights.IMAGENET1K_V1.transforms(resize_size=224)
+    with torch.no_grad():
+        pooled = encoder(images).mean(dim=(2, 3))
+        torch.testing.assert_close(pooled, reference(transform(images)), atol=1e-4, rtol=1e-4)
+
+
+def test_missing_weights_name_the_file_and_the_way_out(torch_cache):
+    with pytest.raises(UserError) as caught:
+        ResNet18(stride=None, weights="IMAGENET1K_V1", load_weights=True)
+    message = str(caught.value)
+    assert str(torch_cache / WEIGHTS_FILE) in message
+    assert "model.encoder.weights=null" in message
+    assert "\n" not in message
+
+
+def test_weights_that_follow_are_not_fetched_but_their_normalisation_is_kept(torch_cache):
+    encoder = ResNet18(stride=None, weights="IMAGENET1K_V1", load_weights=False)
+    torch.testing.assert_close(encoder.mean_C11.flatten(), torch.tensor([0.485, 0.456, 0.406]))
+
+
+def test_unknown_weights_are_refused():
+    with pytest.raises(UserError, match=r"model\.encoder\.weights: unknown 'V2'; use IMAGENET1K_V1"):
+        ResNet18(stride=None, weights="V2", load_weights=True)
+
+
+def test_a_stride_that_is_not_there_is_refused():
+    with pytest.raises(
+        UserError, match=r"model\.feature_stride: dilated_resnet has features at strides \[4, 16\], got 8"
+    ):
+        DilatedResNet(stride=8, **DILATED)
+
+
+def test_stages_must_be_three():
+    with pytest.raises(UserError, match=r"model\.encoder\.blocks: must be three numbers"):
+        DilatedResNet(stride=4, **{**DILATED, "blocks": [3, 4]})
