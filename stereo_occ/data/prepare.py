@@ -125,7 +125,7 @@ def _render_all(tasks: list[tuple[ObjectSource, Path]], pairs: PairsConfig, work
         return
     # Spawned, not forked: a forked process inherits a GL state that hangs it.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread) as pool:
         jobs = [pool.submit(render_object, source, path, pairs) for source, path in tasks]
         try:
             for job in as_completed(jobs):
@@ -133,6 +133,11 @@ def _render_all(tasks: list[tuple[ObjectSource, Path]], pairs: PairsConfig, work
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _one_thread() -> None:
+    """One thread for the software rasteriser and for NumPy: the processes share the cores."""
+    os.environ |= {"LP_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 def _folder_name(pairs: PairsConfig) -> str:
