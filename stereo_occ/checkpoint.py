@@ -36,12 +36,18 @@ def plain(cfg: DictConfig) -> dict[str, Any]:
     return {str(key): value for key, value in container.items()}
 
 
-def build_task(cfg: DictConfig) -> OccupancyTask:
-    """A fresh task for a training configuration."""
+def build_task(cfg: DictConfig, load_weights: bool = True) -> OccupancyTask:
+    """A fresh task for a training configuration.
+
+    Args:
+        load_weights: read pretrained weights where the encoder asks for them; not needed before a checkpoint is loaded.
+    """
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
     rig = build_rig(typed.rig, typed.data.image_side)
-    return OccupancyTask(build_model(plain(cfg.model), rig), typed.optimizer, typed.scheduler, typed.steps)
+    return OccupancyTask(
+        build_model(plain(cfg.model), rig, load_weights), typed.optimizer, typed.scheduler, typed.steps
+    )
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

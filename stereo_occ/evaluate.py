@@ -41,7 +41,7 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
         torch.set_num_threads(settings.trainer.threads)
     checkpoint = read_checkpoint(Path(settings.checkpoint))
     trained = training_config(checkpoint[KEY]["config"])
-    task = build_task(trained)
+    task = build_task(trained, load_weights=False)
     task.load_state_dict(checkpoint["state_dict"])
     data = build_data(cfg, settings, trained)
     trainer = lightning.Trainer(

@@ -1,0 +1,78 @@
+"""Small solids and shards that several tests share."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from stereo_occ.data.shard import Views, write_shard
+from stereo_occ.errors import UserError
+from stereo_occ.geometry.camera import toed_in_rig
+from stereo_occ.geometry.pose import Pose
+from stereo_occ.geometry.rotations import random_rotations
+from stereo_occ.occupancy.pools import box_pool, surface_pool
+from stereo_occ.render.gl import process_renderer
+from stereo_occ.shapes.shape import Shape
+
+SIDE = 16  # pixels
+POOL = 2000  # points
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_thread():
+    """Other threads gain nothing on models this small, and results do not depend on the machine's cores."""
+    os.environ["OMP_NUM_THREADS"] = "1"
+    torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session")
+def egl():
+    """Skip the tests that render where OpenGL is not to be had."""
+    try:
+        process_renderer(8, 8)
+    except UserError as error:
+        pytest.skip(str(error))
+
+
+def solid(category: str, object_id: str) -> Shape:
+    """A box with a hole through it, its proportions drawn from its name; it looks different from every side."""
+    rng = np.random.default_rng(list(object_id.encode()))
+    outer = trimesh.creation.box(extents=rng.uniform(0.4, 1, 3))
+    hole = trimesh.creation.cylinder(radius=0.1, height=3, sections=12)
+    return Shape(category, object_id, outer.difference(hole), facts={"kind": "box"}).normalized()
+
+
+def views_of(count: int, side: int = SIDE, seed: int = 0, scale: float = 1.0) -> Views:
+    """Noise for images, random poses at the fixation point, the paper's cameras."""
+    rng = np.random.default_rng(seed)
+    rig = toed_in_rig(1.0, np.pi / 16, np.pi / 3, side)
+    poses = [Pose(rotation_33, scale, np.zeros(3)) for rotation_33 in random_rotations(count, rng)]
+    return Views(
+        rgb=rng.integers(256, size=(count, 2, side, side, 3), dtype=np.uint8),
+        mask=rng.integers(256, size=(count, 2, side, side), dtype=np.uint8),
+        depth=rng.uniform(0.5, 1.5, (count, 2, side, side)).astype(np.float16),
+        K=np.tile(np.stack([camera.K for camera in rig.cameras]), (count, 1, 1, 1)),
+        camera_from_rig=np.tile(
+            np.stack([camera.camera_from_rig for camera in rig.cameras]), (count, 1, 1, 1)
+        ),
+        rig_from_object=np.stack([pose.rig_from_object for pose in poses]),
+    )
+
+
+def pools_of(shape: Shape, points: int = POOL) -> dict:
+    """Point pools as the shards of a run have them."""
+    rng = np.random.default_rng(0)
+    return {"box": box_pool(shape, points, rng), "surface": surface_pool(shape, points, rng)}
+
+
+def small_shard(
+    folder: Path, category: str = "mug", object_id: str = "cup", views: int = 3, **kwargs
+) -> Path:
+    """Write a shard of :func:`solid` and return its path."""
+    shape = solid(category, object_id)
+    path = folder / category / f"{object_id}.h5"
+    write_shard(path, shape, views_of(views, **kwargs), pools_of(shape))
+    return path
