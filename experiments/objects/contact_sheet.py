@@ -7,8 +7,8 @@ import numpy as np
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from stereo_occ.pictures import picture
 from stereo_occ.geometry.camera import toed_in_rig
+from stereo_occ.pictures import picture
 from stereo_occ.shapes.procedural import procedural_shape
 from stereo_occ.shapes.shape import CATEGORIES
 
