@@ -172,6 +172,7 @@ class ValidationConfig:
     views: int = MISSING  # poses per validation object
     points: int = MISSING  # per view, for each of the box and the cube
     checkpoint_interval: int = MISSING  # steps between copies of the latest state
+    keep_all: bool = MISSING  # keep the weights of every validation, not of the best one alone
 
 
 @dataclass

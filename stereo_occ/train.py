@@ -24,6 +24,8 @@ def train(cfg: DictConfig, folder: Path) -> lightning.Trainer:
     assert isinstance(typed, TrainConfig)
     if typed.trainer.threads:
         torch.set_num_threads(typed.trainer.threads)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "config.yaml").write_text(OmegaConf.to_yaml(cfg, resolve=True))
     data = build_data(typed)
     data.prepare_data()
     lightning.seed_everything(typed.seed, verbose=False)
@@ -70,6 +72,17 @@ def build_callbacks(cfg: DictConfig, typed: TrainConfig, folder: Path) -> list[C
         ),
         WriteMetrics(folder / "metrics.json"),
     ]
+    if validation.keep_all:
+        callbacks.append(
+            ModelCheckpoint(
+                folder,
+                filename="step_{step:06d}",
+                monitor="val/iou",
+                save_top_k=-1,
+                save_weights_only=True,
+                auto_insert_metric_name=False,
+            )
+        )
     if typed.logger.tensorboard:
         callbacks += [
             ShowInTensorBoard(typed.logger, plain(cfg)),

@@ -69,10 +69,15 @@ def write_shard(path: Path, shape: Shape, views: Views, pools: Mapping[str, Poin
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with h5py.File(temporary, "w", libver="latest", track_order=False) as file:
-            file.attrs.update(
-                format=FORMAT, version=VERSION, category=shape.category, object_id=shape.object_id
-            )
-            file.attrs["facts"] = json.dumps(dict(shape.facts), sort_keys=True)
+            file.attrs["version"] = VERSION
+            for name, text in (
+                ("format", FORMAT),
+                ("category", shape.category),
+                ("object_id", shape.object_id),
+                ("facts", json.dumps(dict(shape.facts), sort_keys=True)),
+            ):
+                # Of fixed length: longer and shorter ones lie in a heap that HDF5 keeps without a checksum.
+                file.attrs[name] = np.bytes_(text.encode())
             _write(file, "mesh/vertices", shape.mesh.vertices.astype(np.float32))
             _write(file, "mesh/faces", shape.mesh.faces.astype(np.int32))
             for name, array in vars(views).items():
@@ -114,12 +119,14 @@ class Shard:
     def _file(self) -> h5py.File:
         try:
             file = h5py.File(self.path, "r")
-        except OSError as error:
+            form, version = file.attrs.get("format"), file.attrs.get("version")
+        except (OSError, RuntimeError) as error:
             raise self._damaged(error) from error
-        if file.attrs.get("format") != FORMAT or file.attrs.get("version") != VERSION:
+        form = form.decode() if isinstance(form, bytes) else form
+        if form != FORMAT or version != VERSION:
             raise UserError(
-                f"{self.path}: is {file.attrs.get('format')} version {file.attrs.get('version')}, expected "
-                f"{FORMAT} version {VERSION}; delete it and render again"
+                f"{self.path}: is {form} version {version}, expected {FORMAT} version {VERSION}; "
+                f"delete it and render again"
             )
         return file
 
@@ -130,16 +137,28 @@ class Shard:
     def _opened(self) -> dict[str, h5py.Dataset]:
         return {}
 
-    def _read(self, name: str, selection: Any = ...) -> NDArray[Any]:
+    def _dataset(self, name: str) -> h5py.Dataset:
         try:
             if name not in self._opened:  # opening a data set takes longer than reading one view
                 self._opened[name] = self._file[name]
-            return np.asarray(self._opened[name][selection])
-        except (OSError, KeyError) as error:
+        except (OSError, KeyError, RuntimeError) as error:
+            raise self._damaged(error) from error
+        return self._opened[name]
+
+    def _read(self, name: str, selection: Any = ...) -> NDArray[Any]:
+        try:
+            return np.asarray(self._dataset(name)[selection])
+        except (OSError, RuntimeError) as error:
+            raise self._damaged(error) from error
+
+    def _text(self, name: str) -> str:
+        try:
+            return bytes(self._file.attrs[name]).decode()
+        except (OSError, KeyError, RuntimeError) as error:
             raise self._damaged(error) from error
 
     def __len__(self) -> int:
-        return int(self._file["views/rgb"].shape[0])
+        return len(self._dataset("views/rgb"))
 
     def __enter__(self) -> Self:
         return self
@@ -159,17 +178,17 @@ class Shard:
     @cached_property
     def category(self) -> str:
         """The object's category."""
-        return str(self._file.attrs["category"])
+        return self._text("category")
 
     @cached_property
     def object_id(self) -> str:
         """The object's name, unique within its data set."""
-        return str(self._file.attrs["object_id"])
+        return self._text("object_id")
 
     @property
     def facts(self) -> dict[str, Any]:
         """Plain figures about the object."""
-        return dict(json.loads(self._file.attrs["facts"]))
+        return dict(json.loads(self._text("facts")))
 
     @property
     def mesh(self) -> Trimesh:
@@ -219,5 +238,5 @@ class Shard:
                 self._file[group].visititems(
                     lambda _, node: node[...] if isinstance(node, h5py.Dataset) else None
                 )
-            except (OSError, KeyError) as error:
+            except (OSError, KeyError, RuntimeError) as error:
                 raise self._damaged(error) from error
