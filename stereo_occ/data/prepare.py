@@ -19,7 +19,7 @@ from tqdm import tqdm
 from stereo_occ.config import PairsConfig, RigConfig
 from stereo_occ.data.objects import ObjectSource, list_objects
 from stereo_occ.data.placement import draw_pose
-from stereo_occ.data.shard import VERSION, Views, write_shard
+from stereo_occ.data.shard import VERSION, Views, remove_partial, write_shard
 from stereo_occ.geometry.camera import StereoRig, toed_in_rig
 from stereo_occ.occupancy.pools import box_pool, surface_pool
 from stereo_occ.render.appearance import draw_appearance
@@ -59,7 +59,7 @@ def prepare(pairs: PairsConfig, progress: bool) -> PreparedShards:
     paths = [folder / source.category / f"{source.object_id}.h5" for source in sources]
     missing = [(source, path) for source, path in zip(sources, paths, strict=True) if not path.exists()]
     if missing:
-        _remove_partial(folder)
+        remove_partial(folder)
         _write_description(folder, pairs)
         workers = min(len(missing), pairs.workers or os.cpu_count() or 1)
         bar = tqdm(
@@ -168,11 +168,3 @@ def _plain(value: object) -> object:
 def _write_description(folder: Path, pairs: PairsConfig) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "dataset.json").write_text(json.dumps(_description(pairs), indent=2, sort_keys=True) + "\n")
-
-
-def _remove_partial(folder: Path) -> None:
-    """Remove what a killed process of an earlier run left behind."""
-    for partial_file in folder.glob("*/.*.part"):
-        process = int(partial_file.name.split(".")[-2])
-        if not Path(f"/proc/{process}").exists():
-            partial_file.unlink(missing_ok=True)

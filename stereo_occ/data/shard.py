@@ -24,9 +24,12 @@ damage is an error and not a wrong number. A shard appears under its name only w
 
 import json
 import os
+import socket
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Self
 
@@ -65,36 +68,69 @@ def write_shard(path: Path, shape: Shape, views: Views, pools: Mapping[str, Poin
     Raises:
         UserError: the disk is full or the folder cannot be written.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = partial_path(path, socket.gethostname(), os.getpid())
+    image = _file_image(shape, views, pools)
     try:
-        with h5py.File(temporary, "w", libver="latest", track_order=False) as file:
-            file.attrs["version"] = VERSION
-            for name, text in (
-                ("format", FORMAT),
-                ("category", shape.category),
-                ("object_id", shape.object_id),
-                ("facts", json.dumps(dict(shape.facts), sort_keys=True)),
-            ):
-                # Of fixed length: longer and shorter ones lie in a heap that HDF5 keeps without a checksum.
-                file.attrs[name] = np.bytes_(text.encode())
-            _write(file, "mesh/vertices", shape.mesh.vertices.astype(np.float32))
-            _write(file, "mesh/faces", shape.mesh.faces.astype(np.int32))
-            for name, array in vars(views).items():
-                _write(file, f"views/{name}", array, chunk_length=1)
-            for name, pool in pools.items():
-                _write(file, f"points/{name}/grid", pool.grid_N3, chunk_length=POINTS_PER_CHUNK)
-                _write(file, f"points/{name}/bounds", np.stack([pool.low_3, pool.extent_3]))
-                _write(file, f"points/{name}/part", pool.part_N, chunk_length=POINTS_PER_CHUNK)
-        with temporary.open("rb") as written:
-            os.fsync(written.fileno())
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("wb") as file:
+            file.write(image)
+            file.flush()
+            os.fsync(file.fileno())
         temporary.replace(path)
     except OSError as error:
         raise UserError(
             f"{path}: cannot write the shard ({error}); free some disk space or set paths.data"
         ) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(NotADirectoryError):
+            temporary.unlink(missing_ok=True)
+
+
+def _file_image(shape: Shape, views: Views, pools: Mapping[str, PointPool]) -> memoryview:
+    """The bytes of the file, made in memory: where a disk is full, HDF5 crashes instead of raising."""
+    image = BytesIO()
+    with h5py.File(image, "w", libver="latest", track_order=False) as file:
+        file.attrs["version"] = VERSION
+        for name, text in (
+            ("format", FORMAT),
+            ("category", shape.category),
+            ("object_id", shape.object_id),
+            ("facts", json.dumps(dict(shape.facts), sort_keys=True)),
+        ):
+            # Of fixed length: strings of variable length lie in a heap that HDF5 keeps without a checksum.
+            file.attrs[name] = np.bytes_(text.encode())
+        _write(file, "mesh/vertices", shape.mesh.vertices.astype(np.float32))
+        _write(file, "mesh/faces", shape.mesh.faces.astype(np.int32))
+        for name, array in vars(views).items():
+            _write(file, f"views/{name}", array, chunk_length=1)
+        for name, pool in pools.items():
+            _write(file, f"points/{name}/grid", pool.grid_N3, chunk_length=POINTS_PER_CHUNK)
+            _write(file, f"points/{name}/bounds", np.stack([pool.low_3, pool.extent_3]))
+            _write(file, f"points/{name}/part", pool.part_N, chunk_length=POINTS_PER_CHUNK)
+    return image.getbuffer()
+
+
+def partial_path(path: Path, host: str, process: int) -> Path:
+    """Where a process writes a shard before it gets its name."""
+    return path.with_name(f".{path.name}.{host}.{process}.part")
+
+
+def remove_partial(folder: Path) -> None:
+    """Remove what killed processes of this machine left behind in the category folders of ``folder``."""
+    for partial in folder.glob("*/.*.part"):
+        _, process, _ = partial.name.rsplit(".", 2)
+        if f".{socket.gethostname()}.{process}." in partial.name and not _is_alive(int(process)):
+            partial.unlink(missing_ok=True)
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # another user's
+        return True
+    return True
 
 
 def _write(file: h5py.File, name: str, array: NDArray[Any], chunk_length: int | None = None) -> None:
@@ -119,10 +155,9 @@ class Shard:
     def _file(self) -> h5py.File:
         try:
             file = h5py.File(self.path, "r")
-            form, version = file.attrs.get("format"), file.attrs.get("version")
+            form, version = _text(file.attrs.get("format")), file.attrs.get("version")
         except (OSError, RuntimeError) as error:
             raise self._damaged(error) from error
-        form = form.decode() if isinstance(form, bytes) else form
         if form != FORMAT or version != VERSION:
             raise UserError(
                 f"{self.path}: is {form} version {version}, expected {FORMAT} version {VERSION}; "
@@ -153,7 +188,7 @@ class Shard:
 
     def _text(self, name: str) -> str:
         try:
-            return bytes(self._file.attrs[name]).decode()
+            return _text(self._file.attrs[name])
         except (OSError, KeyError, RuntimeError) as error:
             raise self._damaged(error) from error
 
@@ -233,10 +268,15 @@ class Shard:
 
     def verify(self) -> None:
         """Read everything once, so that any damage raises :class:`UserError`."""
-        for group in ("mesh", "views", "points"):
-            try:
-                self._file[group].visititems(
-                    lambda _, node: node[...] if isinstance(node, h5py.Dataset) else None
-                )
-            except (OSError, KeyError, RuntimeError) as error:
-                raise self._damaged(error) from error
+        names: list[str] = []
+        try:
+            self._file.visit(names.append)
+            for name in names:
+                if isinstance(node := self._file[name], h5py.Dataset):
+                    node[...]
+        except (OSError, KeyError, RuntimeError) as error:
+            raise self._damaged(error) from error
+
+
+def _text(attribute: Any) -> str:
+    return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
