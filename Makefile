@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 DEMO := outputs/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint types check tensorboard figures lock clean
+.PHONY: help setup demo test lint types check tensorboard results figures lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -44,6 +44,12 @@ check: lint types test ## all that must pass before a change goes in
 
 tensorboard: $(READY) ## open the dashboards of every run under outputs/
 	$(RUN)/tensorboard --logdir outputs
+
+results: $(READY) ## the README's table and figures from the files under experiments/
+	$(RUN)/python experiments/results.py
+
+figures: $(READY) ## the contact sheet of procedural objects
+	$(RUN)/python experiments/objects/contact_sheet.py
 
 lock: ## renew requirements.lock from pyproject.toml (needs uv)
 	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes \

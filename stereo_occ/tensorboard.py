@@ -50,7 +50,7 @@ class ShowInTensorBoard(Callback):
         writer.add_pr_curve("val/precision_recall", occupied, probabilities, step)
         data = trainer.datamodule  # type: ignore[attr-defined]
         for example in examples(data.evaluation_dataset("val"), self.config.examples):
-            name = f"{example.id.category}/{example.id.object_id}"
+            name = f"example/{example.id.object_id}"
             views = example.batch.to(pl_module.device).views
             threshold = float(pl_module.threshold)
             predicted = reconstruct(pl_module.model, views, threshold, self.config.mesh_resolution)
