@@ -40,8 +40,8 @@ def egl():
 def solid(category: str, object_id: str) -> Shape:
     """A box with a hole through it, its proportions drawn from its name; it looks different from every side."""
     rng = np.random.default_rng(list(object_id.encode()))
-    outer = trimesh.creation.box(extents=rng.uniform(0.4, 1, 3))
-    hole = trimesh.creation.cylinder(radius=0.1, height=3, sections=12)
+    outer = trimesh.creation.box(extents=rng.uniform(0.2, 1, 3))
+    hole = trimesh.creation.cylinder(radius=0.05, height=3, sections=12)
     return Shape(category, object_id, outer.difference(hole), facts={"kind": "box"}).normalized()
 
 

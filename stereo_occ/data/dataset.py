@@ -105,8 +105,8 @@ class TrainingPairs(PairsDataset):
         self, shards: Sequence[Shard], views: Sequence[int], queries: QueriesConfig, points: int, seed: int
     ) -> None:
         super().__init__(shards, views)
-        surface, outside = round(queries.surface * points), round(queries.outside * points)
-        self.counts = {"box": points - surface - outside, "outside": outside, "surface": surface}
+        ends = np.rint(np.cumsum([queries.box, queries.outside, queries.surface]) * points).astype(int)
+        self.counts = dict(zip(("box", "outside", "surface"), np.diff(ends, prepend=0).tolist(), strict=True))
         self.seed = seed
 
     def __getitems__(self, draws: list[Draw]) -> Batch:
