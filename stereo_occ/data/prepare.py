@@ -4,6 +4,7 @@ import hashlib
 import json
 import multiprocessing
 import os
+import threading
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
@@ -125,7 +126,7 @@ def _render_all(tasks: list[tuple[ObjectSource, Path]], pairs: PairsConfig, work
         return
     # Spawned, not forked: a forked process inherits a GL state that hangs it.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
         jobs = [pool.submit(render_object, source, path, pairs) for source, path in tasks]
         try:
             for job in as_completed(jobs):
@@ -135,9 +136,17 @@ def _render_all(tasks: list[tuple[ObjectSource, Path]], pairs: PairsConfig, work
             raise
 
 
-def _one_thread() -> None:
-    """One thread for the software rasteriser and for NumPy: the processes share the cores."""
+def _start_worker() -> None:
+    """One thread for the software rasteriser and for NumPy, since processes share the cores; end with the parent."""
     os.environ |= {"LP_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _folder_name(pairs: PairsConfig) -> str:
