@@ -2,22 +2,21 @@
 
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from trimesh import Trimesh
 
+from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import Camera, StereoRig
 from stereo_occ.render.appearance import MAX_LIGHTS, Appearance
 from stereo_occ.render.gl import import_pyrender, process_renderer
 from stereo_occ.render.normals import split_at_creases
+from stereo_occ.render.pixels import center_depth, mean_color, over
 
 #: Edges sharper than this stay sharp.
 CREASE_ANGLE = np.radians(40)
-
-#: Samples of a pixel whose depths differ by more than this share are not of one surface.
-DEPTH_STEP = 0.02
 
 #: OpenGL cameras look along -Z with +Y up.
 CV_FROM_GL = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -49,9 +48,8 @@ class StereoRenderer:
     def __init__(self, supersampling: int = 2) -> None:
         self._supersampling = supersampling
         self._pyrender = import_pyrender()
-        flags = self._pyrender.RenderFlags
-        self._flags = flags.RGBA
-        self._scene = self._pyrender.Scene(bg_color=[0, 0, 0, 0])
+        self._flags = self._pyrender.RenderFlags.RGBA
+        self._scene = _lit_scene(self._pyrender)
         self._camera = self._pyrender.IntrinsicsCamera(1, 1, 0, 0)
         self._camera_node = self._scene.add(self._camera)
         self._light_nodes = [self._scene.add(self._pyrender.DirectionalLight()) for _ in range(MAX_LIGHTS)]
@@ -88,39 +86,46 @@ class StereoRenderer:
     def render(
         self, rig: StereoRig, rig_from_object: NDArray[np.float64], appearance: Appearance
     ) -> StereoImages:
-        """Render the loaded object.
+        """Render the loaded object; surfaces nearer than 5 cm or farther than 100 m are not drawn.
 
         Args:
-            rig: both images must have the same size.
+            rig: any two cameras without skew whose images have the same size.
             rig_from_object: 4x4 similarity: rotation times scale, translation in metres.
+
+        Raises:
+            UserError: if the cameras are not so, the transform mirrors or OpenGL cannot be started.
+            RuntimeError: if no object is loaded.
         """
         if self._mesh_node is None:
             raise RuntimeError("load an object before rendering")
+        _check_rig(rig)
+        if not np.linalg.det(rig_from_object[:3, :3]) > 0:
+            raise UserError(f"rig_from_object: must not mirror the object, got {rig_from_object.tolist()}")
         self._scene.set_pose(self._mesh_node, rig_from_object)
         self._set_appearance(appearance)
-        views = [self._view(camera) for camera in rig.cameras]
-        rgba_2HW4 = np.stack([rgba for rgba, _ in views])
-        alpha = rgba_2HW4[..., 3:].astype(np.uint16)
-        rgb = rgba_2HW4[..., :3] + ((255 - alpha) * appearance.background_3 + 127) // 255
-        return StereoImages(rgb.astype(np.uint8), rgba_2HW4[..., 3], np.stack([depth for _, depth in views]))
+        views = [self._samples(camera) for camera in rig.cameras]
+        rgba_2HW4 = mean_color(np.stack([rgba for rgba, _ in views]), self._supersampling)
+        return StereoImages(
+            rgb_2HW3=over(rgba_2HW4, appearance.background_3),
+            mask_2HW=rgba_2HW4[..., 3],
+            depth_2HW=center_depth(np.stack([depth for _, depth in views]), self._supersampling),
+        )
 
     def _set_appearance(self, appearance: Appearance) -> None:
         self._scene.ambient_light = np.full(3, appearance.ambient)
-        for index, node in enumerate(self._light_nodes):
-            if index < len(appearance.light_from_L3):
-                node.light.color = appearance.light_color_L3[index]
-                node.light.intensity = 1.0
-                pose = np.eye(4)
-                pose[:3, 2] = appearance.light_from_L3[index]
-                self._scene.set_pose(node, pose)
-            else:
-                node.light.intensity = 0.0
+        self._scene.lit = self._light_nodes[: len(appearance.light_from_L3)]
+        lights = zip(self._scene.lit, appearance.light_from_L3, appearance.light_color_L3, strict=True)
+        for node, from_3, color_3 in lights:
+            node.light.color = color_3
+            pose = np.eye(4)
+            pose[:3, 2] = from_3  # a light shines along its -Z
+            self._scene.set_pose(node, pose)
         self._material.baseColorFactor = [*appearance.base_color_3, 1.0]
         self._material.metallicFactor = appearance.metallic
         self._material.roughnessFactor = appearance.roughness
 
-    def _view(self, camera: Camera) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Premultiplied colour and coverage ``(H, W, 4)``, depth ``(H, W)``."""
+    def _samples(self, camera: Camera) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Premultiplied colour and coverage ``(H, W, 4)`` and depth ``(H, W)`` of the samples of all pixels."""
         factor = self._supersampling
         scale = np.array([factor, factor, 1])[:, None]
         K = scale * camera.K
@@ -130,33 +135,34 @@ class StereoRenderer:
         self._scene.set_pose(self._camera_node, np.linalg.inv(camera.camera_from_rig) @ CV_FROM_GL)
         renderer = process_renderer(factor * camera.width, factor * camera.height)
         rgba, depth = renderer.render(self._scene, self._flags)
-        return _mean_color(rgba, factor), _center_depth(depth, factor)
+        return rgba, depth
 
 
-def _blocks(samples: NDArray[Any], factor: int) -> NDArray[Any]:
-    """The ``factor`` by ``factor`` samples of each pixel ``(H, W, factor^2, ...)``."""
-    height, width = samples.shape[0] // factor, samples.shape[1] // factor
-    blocks = samples.reshape(height, factor, width, factor, *samples.shape[2:]).swapaxes(1, 2)
-    return blocks.reshape(height, width, factor * factor, *samples.shape[2:])
+def _check_rig(rig: StereoRig) -> None:
+    sizes = [(camera.width, camera.height) for camera in rig.cameras]
+    if sizes[0] != sizes[1]:
+        raise UserError(f"rig: images must have one size, left is {sizes[0]} and right {sizes[1]} pixels")
+    for name, camera in zip(("left", "right"), rig.cameras, strict=True):
+        if camera.K[0, 1] != 0:
+            raise UserError(f"rig.{name}.K: skew cannot be rendered, set K[0, 1] to 0, got {camera.K[0, 1]}")
 
 
-def _mean_color(rgba: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
-    sums = _blocks(rgba, factor).sum(axis=2, dtype=np.uint16)
-    mean: NDArray[np.uint8] = ((sums + factor * factor // 2) // (factor * factor)).astype(np.uint8)
-    return mean
+def _lit_scene(pyrender: Any) -> Any:
+    """An empty scene before a transparent background.
 
-
-def _center_depth(depth: NDArray[np.float32], factor: int) -> NDArray[np.float32]:
-    """Depth at the centres of pixels; where the samples are not of one surface, that of the nearest.
-
-    Inverse depth is linear over the image of a plane, so its mean over a pixel is its value at the centre.
+    pyrender adds up all lights of a scene, in the order of a set, which differs between processes and with it the
+    rounding of a colour. Here those in ``lit`` count, in their order.
     """
-    samples = _blocks(depth, factor)
-    inverse = np.divide(1, samples, out=np.zeros_like(samples), where=samples > 0)
-    nearest = inverse.max(axis=2)
-    smooth = inverse.min(axis=2) > (1 - DEPTH_STEP) * nearest
-    inverse_at_center = np.where(smooth, inverse.mean(axis=2), nearest)
-    depth_HW: NDArray[np.float32] = np.divide(
-        1, inverse_at_center, out=np.zeros_like(nearest), where=nearest > 0
-    )
-    return depth_HW
+
+    class Scene(pyrender.Scene):  # type: ignore[misc]
+        lit: ClassVar[list[Any]] = []
+
+        @property
+        def directional_light_nodes(self) -> list[Any]:
+            return self.lit
+
+        @property
+        def light_nodes(self) -> list[Any]:
+            return self.lit
+
+    return Scene(bg_color=[0, 0, 0, 0])

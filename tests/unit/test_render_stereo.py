@@ -1,5 +1,6 @@
 """Pixels, coverage and depth against analytic scenes."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -9,6 +10,7 @@ import trimesh
 from stereo_occ.geometry.camera import Camera, StereoRig, toed_in_rig
 from stereo_occ.geometry.rotations import random_rotations
 from stereo_occ.pictures import LOOK
+from stereo_occ.render.appearance import GAMMA
 from stereo_occ.render.stereo import StereoRenderer
 
 SIDE, RADIUS = 64, 0.3
@@ -124,6 +126,15 @@ def test_light_comes_from_where_it_is_said_to(renderer, ball):
     renderer.load(ball)
     left_HW3 = renderer.render(RIGS[0], np.eye(4), LOOK).rgb_2HW3[0].astype(float)
     assert left_HW3[22:26, 22:26].mean() > left_HW3[38:42, 38:42].mean() + 20
+
+
+def test_lights_of_the_former_appearance_are_off(renderer, ball):
+    renderer.load(ball)
+    dark = replace(LOOK, light_from_L3=np.zeros((0, 3)), light_color_L3=np.zeros((0, 3)))
+    renderer.render(RIGS[0], np.eye(4), LOOK)
+    images = renderer.render(RIGS[0], np.eye(4), dark)
+    ambient_3 = np.rint(255 * (LOOK.ambient * LOOK.base_color_3) ** (1 / GAMMA))
+    assert np.abs(images.rgb_2HW3[images.mask_2HW == 255] - ambient_3).max() <= 1
 
 
 def test_inverted_winding_shades_the_same(renderer, ball):
