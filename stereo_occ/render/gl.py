@@ -24,10 +24,11 @@ _owner: int | None = None
 
 
 def import_pyrender() -> Any:
-    """pyrender, set up for EGL unless ``PYOPENGL_PLATFORM`` says otherwise.
+    """pyrender, set up for EGL.
 
     Raises:
-        UserError: if PyOpenGL is too old for this Python, or OpenGL cannot be loaded.
+        UserError: if PyOpenGL is too old for this Python, ``PYOPENGL_PLATFORM`` names another platform (OSMesa has no
+            coverage), or OpenGL cannot be loaded.
     """
     installed = tuple(int(part) for part in version("PyOpenGL").split(".")[:3] if part.isdigit())
     if sys.version_info >= (3, 12) and installed < (3, 1, 10):
@@ -35,7 +36,9 @@ def import_pyrender() -> Any:
             f"PyOpenGL {version('PyOpenGL')} does not work on Python 3.12 and later: "
             "pip install --no-deps 'PyOpenGL>=3.1.10'"
         )
-    os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
+    platform = os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
+    if platform != "egl":
+        raise UserError(f"PYOPENGL_PLATFORM={platform}: rendering needs egl; unset the variable")
     logging.getLogger("OpenGL").setLevel(logging.WARNING)
     if not hasattr(np, "infty"):  # NumPy 2 dropped the name, pyrender.Mesh.bounds uses it
         vars(np)["infty"] = np.inf
@@ -57,11 +60,11 @@ def process_renderer(width: int, height: int) -> Any:
     if _renderer is None:
         pyrender = import_pyrender()
         try:
-            _renderer = pyrender.OffscreenRenderer(width, height)
-            _renderer._renderer = _single_sampled(pyrender.renderer)(width, height)
+            offscreen = pyrender.OffscreenRenderer(width, height)
+            offscreen._renderer = _single_sampled(pyrender.renderer)(width, height)
         except Exception as error:
             raise _no_gl(error) from error
-        _owner = os.getpid()
+        _renderer, _owner = offscreen, os.getpid()
     if _owner != os.getpid():
         raise UserError(
             "rendering in a process forked after OpenGL started would hang: use the 'spawn' start method"
@@ -75,19 +78,25 @@ def _single_sampled(module: Any) -> Any:
 
     class SingleSampled(module.Renderer):  # type: ignore[misc]
         def _configure_main_framebuffer(self) -> None:
-            multisampled = module.glRenderbufferStorageMultisample
-            module.glRenderbufferStorageMultisample = lambda target, _, *size: multisampled(target, 0, *size)
-            try:
-                super()._configure_main_framebuffer()
-            finally:
-                module.glRenderbufferStorageMultisample = multisampled
+            former_size = self._main_fb_dims
+            super()._configure_main_framebuffer()
+            if self._main_fb_dims == former_size:
+                return
+            for buffer, content in (
+                (self._main_cb_ms, module.GL_RGBA),
+                (self._main_db_ms, module.GL_DEPTH_COMPONENT24),
+            ):
+                module.glBindRenderbuffer(module.GL_RENDERBUFFER, buffer)
+                module.glRenderbufferStorage(module.GL_RENDERBUFFER, content, *self._main_fb_dims)
 
     return SingleSampled
 
 
 def _no_gl(error: Exception) -> UserError:
-    cause = " ".join(str(error).split()) or type(error).__name__
+    cause = " ".join(str(error).split())[:80] or type(error).__name__
+    device = os.environ.get("EGL_DEVICE_ID")
+    if device is not None:
+        cause += f"; EGL_DEVICE_ID={device}"
     return UserError(
-        f"rendering needs OpenGL through EGL, which failed to start ({cause[:160]}; "
-        f"PYOPENGL_PLATFORM={os.environ.get('PYOPENGL_PLATFORM')}): apt-get install {PACKAGES}"
+        f"rendering needs OpenGL through EGL, which failed to start ({cause}): apt-get install {PACKAGES}"
     )
