@@ -1,35 +1,53 @@
 """What a configuration must satisfy beyond types: every problem, one line each with key, value and remedy."""
 
-from collections.abc import Iterator
-from math import isclose
+from collections.abc import Iterator, Sequence
+from math import inf, isclose
 from pathlib import Path
 from typing import Any
 
-from omegaconf import DictConfig
+import numpy as np
+import torch
+from omegaconf import DictConfig, OmegaConf
 
-from stereo_occ.cli import nearest
+from stereo_occ.config import SplitKind
 from stereo_occ.data.prepare import build_rig
+from stereo_occ.data.splits import SUBSETS, subset_sizes
 from stereo_occ.errors import UserError
-from stereo_occ.models.build import ENCODERS
+from stereo_occ.models.build import build_model
 from stereo_occ.optimization import OPTIMIZERS, SCHEDULES
+from stereo_occ.problems import nearest
+from stereo_occ.render.appearance import draw_appearance
 from stereo_occ.shapes.shape import CATEGORIES
 
+ACCELERATORS = ("cpu", "gpu", "auto")
 PRECISIONS = ("32-true", "bf16-mixed", "16-mixed")
 
 
 def check_pairs(cfg: DictConfig) -> list[str]:
     """Problems of the part of a configuration that describes stereo pairs."""
-    return list(_pairs(cfg))
+    return [*_objects(cfg), *_placement(cfg), *_rig(cfg), *_appearance(cfg)]
 
 
 def check_training(cfg: DictConfig) -> list[str]:
     """Problems of a training configuration."""
-    return [*_pairs(cfg), *_training(cfg)]
+    pairs = check_pairs(cfg)
+    return [
+        *pairs,
+        *([] if pairs else [*_split(cfg), *_model(cfg)]),
+        *_schedule(cfg),
+        *_settings(cfg),
+        *_hardware(cfg),
+    ]
 
 
 def check_evaluation(cfg: DictConfig) -> list[str]:
-    """Problems of an evaluation configuration."""
-    problems = list(_positive(cfg, "views", "points", "batch_size"))
+    """Problems of an evaluation configuration, its checkpoint unread."""
+    problems = [
+        *_at_least(1, cfg, "views", "points", "batch_size", "mesh_resolution"),
+        *_at_least(0, cfg, "examples", "workers"),
+        *_known("subset", cfg.subset, (*SUBSETS, "all")),
+        *_hardware(cfg),
+    ]
     if not Path(cfg.checkpoint).is_file():
         problems.append(
             f"checkpoint={cfg.checkpoint}: no such file; give the path of a .ckpt file of a training run"
@@ -39,90 +57,147 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
     return problems
 
 
-def _pairs(cfg: DictConfig) -> Iterator[str]:
-    yield from _positive(cfg, "data.views", "data.image_side", "data.pool_size")
+def _objects(cfg: DictConfig) -> Iterator[str]:
+    yield from _at_least(1, cfg, "data.views", "data.image_side", "data.pool_size")
+    yield from _at_least(0, cfg, "data.seed", "workers")
     names = list(cfg.categories.names)
-    yield from (
-        f"categories.names={name}: unknown category; {nearest(name, CATEGORIES)}"
-        for name in names
-        if name not in CATEGORIES
-    )
+    for name in names:
+        yield from _known("categories.names", name, CATEGORIES)
     if not names:
-        yield f"categories.names: is empty; name at least one of {', '.join(CATEGORIES)}"
+        yield f"categories.names=[]: names no category; name at least one of {', '.join(CATEGORIES)}"
     if cfg.data.name == "procedural":
         counts = cfg.data.counts
-        yield from (
-            f"data.counts.{name}: unknown category; {nearest(name, CATEGORIES)}"
-            for name in counts
-            if name not in CATEGORIES
-        )
+        for name in counts:
+            if name not in CATEGORIES:
+                yield f"data.counts.{name}: unknown category; {nearest(name, CATEGORIES)}"
         for name in names:
             if name in CATEGORIES and counts.get(name, 0) < 1:
-                yield f"data.counts.{name}={counts.get(name)}: must be at least 1; or leave it out of categories.names"
-    if cfg.data.name == "meshes":
+                yield (
+                    f"data.counts.{name}={counts.get(name)}: must be at least 1; "
+                    f"or leave {name} out of categories.names"
+                )
+    else:
         yield from _folder(cfg)
     fractions = list(cfg.data.fractions)
     if len(fractions) != 3 or not isclose(sum(fractions), 1) or min(fractions) < 0:
         yield f"data.fractions={fractions}: must be three shares (train, val, test) that add up to 1"
-    low, high = cfg.placement.diagonal
-    if not 0 < low <= high <= 1:
-        yield f"placement.diagonal={[low, high]}: must be 0 < low <= high <= 1 metre, the working volume's side"
-    if cfg.data.image_side > 0:
-        try:
-            build_rig(cfg.rig, cfg.data.image_side)
-        except UserError as error:
-            yield str(error)
 
 
-def _training(cfg: DictConfig) -> Iterator[str]:
-    yield from _positive(
-        cfg, "steps", "points", "batch_size", "optimizer.lr", "validation.interval", "validation.views",
-        "validation.points", "validation.checkpoint_interval", "trainer.devices", "logger.interval",
-    )  # fmt: skip
-    if cfg.validation.interval > 0 and cfg.steps % cfg.validation.interval:
+def _folder(cfg: DictConfig) -> Iterator[str]:
+    if not Path(cfg.data.root).is_dir():
+        yield f"data.root={cfg.data.root}: no such folder; give a folder laid out as category/name/model.*"
+
+
+def _placement(cfg: DictConfig) -> Iterator[str]:
+    diagonal = list(cfg.placement.diagonal)
+    if len(diagonal) != 2 or not 0 < diagonal[0] <= diagonal[1] <= 1:
         yield (
-            f"steps={cfg.steps}: is not a multiple of validation.interval={cfg.validation.interval}, so the last state "
-            f"would not be validated; make it {_next_multiple(cfg.steps, cfg.validation.interval)}"
+            f"placement.diagonal={diagonal}: must be [low, high] with 0 < low <= high <= 1 metre, "
+            f"the working volume's side"
         )
-    multiple = ENCODERS[cfg.model.encoder.name].image_multiple
-    if cfg.data.image_side % multiple:
+
+
+def _rig(cfg: DictConfig) -> Iterator[str]:
+    for key, upper in (("distance", inf), ("half_angle_deg", 90), ("fov_deg", 180)):
+        if not 0 < cfg.rig[key] < upper:
+            yield f"rig.{key}={cfg.rig[key]}: must be above 0 and below {upper}"
+
+
+def _appearance(cfg: DictConfig) -> Iterator[str]:
+    for key in ("low", "high"):
+        if len(cfg.background[key]) != 3:
+            yield f"background.{key}={cfg.background[key]}: must be three values, red, green and blue"
+            return
+    looks = (OmegaConf.to_object(cfg[name]) for name in ("lights", "material", "background"))
+    yield from _refusal(draw_appearance, *looks, np.random.default_rng(0))
+
+
+def _split(cfg: DictConfig) -> Iterator[str]:
+    data = cfg.data
+    if min(data.fractions[:2]) == 0:
+        yield f"data.fractions={data.fractions}: training needs a share for train and one for val"
+    elif data.split is SplitKind.view:
+        yield from _refusal(subset_sizes, data.views, data.fractions, "data.views")
+    elif data.name == "procedural":
+        for name in cfg.categories.names:
+            yield from _refusal(subset_sizes, data.counts[name], data.fractions, f"data.counts.{name}")
+
+
+def _model(cfg: DictConfig) -> Iterator[str]:
+    """Build the model without its weights."""
+    rig = build_rig(cfg.rig, cfg.data.image_side)
+    with torch.device("meta"):
+        yield from _refusal(build_model, OmegaConf.to_container(cfg.model, resolve=True), rig, False)
+
+
+def _schedule(cfg: DictConfig) -> Iterator[str]:
+    if cfg.steps < 1:  # the other keys may be derived from it
+        yield from _at_least(1, cfg, "steps")
+        return
+    keys = ("interval", "views", "points", "checkpoint_interval")
+    yield from _at_least(1, cfg, *(f"validation.{key}" for key in keys))
+    interval = cfg.validation.interval
+    if interval > 0 and cfg.steps % interval:
+        whole = max(1, cfg.steps // interval) * interval
         yield (
-            f"data.image_side={cfg.data.image_side}: must be a multiple of {multiple} for "
-            f"model/encoder={cfg.model.encoder.name}; make it {_next_multiple(cfg.data.image_side, multiple)}"
+            f"steps={cfg.steps}: is not a multiple of validation.interval={interval}, so the last state would not be "
+            f"validated; say steps={whole} validation.interval={interval}"
         )
     if cfg.validation.views > cfg.data.views:
         yield f"validation.views={cfg.validation.views}: there are only data.views={cfg.data.views} per object"
-    if cfg.validation.points > cfg.data.pool_size:
-        yield f"validation.points={cfg.validation.points}: there are only data.pool_size={cfg.data.pool_size} points"
+
+
+def _settings(cfg: DictConfig) -> Iterator[str]:
+    yield from _at_least(1, cfg, "points", "batch_size", "logger.interval", "logger.mesh_resolution")
+    yield from _at_least(0, cfg, "seed", "scheduler.warmup", "logger.examples", "optimizer.weight_decay")
+    for key in ("points", "validation.points"):
+        if _value(cfg, key) > cfg.data.pool_size:
+            yield f"{key}={_value(cfg, key)}: there are only data.pool_size={cfg.data.pool_size} points per object"
+    for key in ("optimizer.lr", "trainer.gradient_clip"):
+        if _value(cfg, key) is not None and not _value(cfg, key) > 0:
+            yield f"{key}={_value(cfg, key)}: must be above 0"
     shares = [cfg.queries.box, cfg.queries.outside, cfg.queries.surface]
     if not isclose(sum(shares), 1) or min(shares) < 0:
         yield f"queries={shares}: box, outside and surface must be shares that add up to 1"
     yield from _known("optimizer.name", cfg.optimizer.name, OPTIMIZERS)
     yield from _known("scheduler.name", cfg.scheduler.name, SCHEDULES)
-    yield from _known("trainer.precision", cfg.trainer.precision, PRECISIONS)
-    if len(cfg.optimizer.betas) != 2 or not all(0 <= beta < 1 for beta in cfg.optimizer.betas):
-        yield f"optimizer.betas={list(cfg.optimizer.betas)}: must be two numbers in [0, 1)"
+    if not 0 <= cfg.scheduler.final <= 1:
+        yield f"scheduler.final={cfg.scheduler.final}: must be a share of the first learning rate, 0 to 1"
+    betas = list(cfg.optimizer.betas)
+    if len(betas) != 2 or not all(0 <= beta < 1 for beta in betas):
+        yield f"optimizer.betas={betas}: must be two numbers in [0, 1)"
 
 
-def _folder(cfg: DictConfig) -> list[str]:
-    if Path(cfg.data.root).is_dir():
-        return []
-    return [f"data.root={cfg.data.root}: no such folder; give a folder laid out as category/name/model.*"]
+def _hardware(cfg: DictConfig) -> Iterator[str]:
+    trainer = cfg.trainer
+    yield from _at_least(0, cfg, "trainer.workers")
+    if trainer.threads is not None:
+        yield from _at_least(1, cfg, "trainer.threads")
+    yield from _known("trainer.precision", trainer.precision, PRECISIONS)
+    yield from _known("trainer.accelerator", trainer.accelerator, ACCELERATORS)
+    if trainer.accelerator == "gpu" and not torch.cuda.is_available():
+        yield "trainer.accelerator=gpu: PyTorch sees no GPU here; say trainer=cpu"
+    if trainer.devices != 1:
+        yield f"trainer.devices={trainer.devices}: a run uses one device; for more, run one job per device"
 
 
-def _positive(cfg: DictConfig, *keys: str) -> Iterator[str]:
+def _at_least(minimum: int, cfg: DictConfig, *keys: str) -> Iterator[str]:
     for key in keys:
-        value: Any = cfg
-        for part in key.split("."):
-            value = value[part]
-        if not value > 0:
-            yield f"{key}={value}: must be positive"
+        if _value(cfg, key) < minimum:
+            yield f"{key}={_value(cfg, key)}: must be at least {minimum}"
 
 
-def _known(key: str, value: str, known: Any) -> Iterator[str]:
+def _known(key: str, value: str, known: Sequence[str] | dict[str, Any]) -> Iterator[str]:
     if value not in known:
         yield f"{key}={value}: unknown; {nearest(value, known)}"
 
 
-def _next_multiple(value: int, of: int) -> int:
-    return -(-value // of) * of
+def _refusal(function: Any, *arguments: Any) -> Iterator[str]:
+    try:
+        function(*arguments)
+    except UserError as error:
+        yield str(error)
+
+
+def _value(cfg: DictConfig, key: str) -> Any:
+    return OmegaConf.select(cfg, key)

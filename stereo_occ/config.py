@@ -270,8 +270,8 @@ def training_config(values: dict[str, Any]) -> DictConfig:
 
 
 def register_schemas() -> None:
-    """Tell Hydra the schemas and OmegaConf the resolver ``divide``; safe to call again."""
-    OmegaConf.register_new_resolver("divide", lambda a, b: int(a) // int(b), replace=True)
+    """Tell Hydra the schemas and OmegaConf the resolver ``divide`` (whole, at least 1); safe to call again."""
+    OmegaConf.register_new_resolver("divide", lambda a, b: max(1, int(a) // int(b)), replace=True)
     store = ConfigStore.instance()
     for name, root in (("train", TrainConfig), ("render", RenderConfig), ("evaluate", EvaluateConfig)):
         store.store(name=f"base_{name}", node=root)

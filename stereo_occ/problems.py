@@ -1,0 +1,213 @@
+"""What is wrong with a command line: every problem at once, one line each with the key, its value and a remedy."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import fields, is_dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override
+from hydra.errors import HydraException
+from omegaconf import (
+    BooleanNode,
+    DictConfig,
+    EnumNode,
+    FloatNode,
+    IntegerNode,
+    ListConfig,
+    Node,
+    OmegaConf,
+    StringNode,
+)
+from omegaconf.errors import InterpolationKeyError, OmegaConfBaseException
+
+from stereo_occ.config import register_schemas
+from stereo_occ.paths import conf_dir
+
+Check = Callable[[DictConfig], list[str]]
+
+# Hydra itself raises ValueError for a group without a choice: model=null.
+COMPOSITION_ERRORS = (HydraException, OmegaConfBaseException, ValueError)
+
+
+def find_problems(
+    config_name: str,
+    overrides: Sequence[str],
+    check: Check,
+    multirun: bool = True,
+    config_dir: Path | None = None,
+) -> list[str]:
+    """Every problem of a command line (or sweep), one line each; empty if there is none.
+
+    Of a sweep, each swept value is tried beside the first values of the others.
+
+    Args:
+        config_name: file in ``conf/``, without its suffix.
+        overrides: as on the command line.
+        check: what a composed configuration must satisfy.
+        multirun: whether several values are allowed.
+        config_dir: searched for groups beside ``conf/``.
+    """
+    register_schemas()
+    with initialize_config_dir(str(conf_dir()), version_base="1.3"):
+        loader = GlobalHydra.instance().config_loader()
+        problems, jobs = [], [[f"hydra.searchpath=[file://{config_dir.resolve()}]"] if config_dir else []]
+        for override in overrides:
+            if override.startswith("~") and not loader.get_group_options(_key(override)):
+                problems.append(f"{override}: a key cannot be removed; give it a value instead")
+                continue
+            try:
+                choices = _choices(OverridesParser.create().parse_override(override))
+            except HydraException:
+                choices = []
+            if not choices or not _key(override):
+                problems.append(
+                    f"{override}: cannot be read; write key=value, and quote a value that holds spaces, commas, "
+                    f"brackets or '=' twice: 'key=\"...\"'"
+                )
+                continue
+            if len(choices) > 1 and not multirun:
+                problems.append(f"{override}: gives several values; add -m to run them one after another")
+            first = jobs[0]
+            jobs = [[*job, choices[0]] for job in jobs] + [[*first, choice] for choice in choices[1:]]
+        unread = tuple(f"{problem.partition('=')[0]}:" for problem in problems)
+        for job in jobs:
+            problems += [p for p in _problems_of_job(config_name, job, check) if not p.startswith(unread)]
+        return list(dict.fromkeys(problems))
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Advice on a misspelt name: the nearest known ones, or all of them."""
+    known = sorted(known)
+    close = get_close_matches(name, known, n=3, cutoff=0.5)
+    return f"did you mean {' or '.join(close)}?" if close else f"known: {', '.join(known)}"
+
+
+def _choices(override: Override) -> list[str]:
+    """The single values of a sweep override, or the override itself."""
+    if not override.is_sweep_override():
+        return [str(override.input_line)]
+    return [f"{override.get_key_element()}={value}" for value in override.sweep_string_iterator()]
+
+
+def _problems_of_job(config_name: str, overrides: list[str], check: Check) -> list[str]:
+    try:
+        cfg = compose(config_name, overrides)
+    except COMPOSITION_ERRORS as error:
+        return _problems_one_by_one(config_name, overrides) or [_one_line(error)]
+    nodes = _nodes(cfg)
+    schema = OmegaConf.get_type(cfg)
+    assert is_dataclass(schema)
+    known = [field.name for field in fields(schema)]
+    problems = [f"{key}: {_unknown(key, known)}" for key in map(str, cfg) if key not in known]
+    problems += [f"{key}: no value given; add {key}=..." for key, node in nodes.items() if node._is_missing()]
+    if problems:
+        return problems
+    try:
+        return check(cfg)
+    except InterpolationKeyError as error:
+        return [
+            f"{error.full_key}={nodes[str(error.full_key)]._value()}: refers to a key that does not exist"
+        ]
+
+
+def _problems_one_by_one(config_name: str, overrides: list[str]) -> list[str]:
+    """Try the overrides of groups first, then each value on top of the groups that compose."""
+    problems: list[str] = []
+    loader = GlobalHydra.instance().config_loader()
+    good: list[str] = []
+    for override in (o for o in overrides if loader.get_group_options(_key(o))):
+        try:
+            compose(config_name, [*good, override])
+            good.append(override)
+        except COMPOSITION_ERRORS as error:
+            problems.append(_problem_of_group(config_name, override, good, error))
+    known = _nodes(compose(config_name, good, return_hydra_config=True))
+    for override in (o for o in overrides if not loader.get_group_options(_key(o))):
+        try:
+            compose(config_name, [*good, override])
+        except COMPOSITION_ERRORS as error:
+            key, _, value = override.partition("=")
+            node = known.get(_key(override))
+            if node is None:
+                problems.append(f"{_key(override)}: {_unknown(_key(override), known)}")
+            elif expected := _expected(node, key):
+                problems.append(f"{key}={value}: must be {expected}")
+            else:
+                problems.append(f"{override}: {_one_line(error)}")
+    return problems
+
+
+def _problem_of_group(config_name: str, override: str, good: list[str], error: Exception) -> str:
+    key, _, value = override.partition("=")
+    options = GlobalHydra.instance().config_loader().get_group_options(_key(override))
+    options = [option for option in options if not option.startswith("base_")]
+    if value not in options:
+        return f"{key}={value}: unknown choice; {nearest(str(value), options)}"
+    choices = compose(config_name, good, return_hydra_config=True).hydra.runtime.choices
+    if _key(override) in choices:
+        return f"{override}: {_one_line(error)}"
+    owner, _, part = _key(override).rpartition("/")
+    if owner in choices:
+        return f"{override}: {owner}={choices[owner]} has no {part}; leave it out or choose another {owner}"
+    groups = ", ".join(sorted(group for group in choices if "/" not in group))
+    return f"{override}: {config_name} has no group {key}; its groups are {groups}"
+
+
+def _key(override: str) -> str:
+    return override.partition("=")[0].lstrip("+~").partition("@")[0]
+
+
+def _nodes(cfg: DictConfig, prefix: str = "") -> dict[str, Node]:
+    """All nodes by dotted key; values that refer to others unresolved."""
+    nodes: dict[str, Node] = {}
+    for name in map(str, cfg.keys()):
+        node = cfg._get_node(name)
+        assert isinstance(node, Node)
+        nodes[f"{prefix}{name}"] = node
+        target = node._maybe_dereference_node()
+        if isinstance(target, DictConfig) and not target._is_missing():
+            nodes |= _nodes(target, f"{prefix}{name}.")
+    return nodes
+
+
+def _unknown(key: str, known: Iterable[str]) -> str:
+    """Advice on an unknown key: near ones beside it, the same name elsewhere, or all that there are beside it."""
+    known = [k for k in known if (k.partition(".")[0] == "hydra") == key.startswith("hydra.")]
+    parent, _, name = key.rpartition(".")
+    while parent and parent not in known:
+        parent, _, name = parent.rpartition(".")
+    beside = [k.rpartition(".")[2] for k in known if k.rpartition(".")[0] == parent]
+    prefix = f"{parent}." if parent else ""
+    close = [prefix + match for match in get_close_matches(name, beside, n=2)]
+    close = close or [k for k in known if k.rpartition(".")[2] == name][:3]
+    if close:
+        return f"unknown key; did you mean {' or '.join(close)}?"
+    return f"unknown key; known{' in ' + parent if parent else ''}: {', '.join(beside)}"
+
+
+def _expected(node: Node, key: str) -> str | None:
+    """What values the node of a key takes, in words."""
+    if isinstance(node, EnumNode):
+        return f"one of {', '.join(node.enum_type.__members__)}"
+    if isinstance(node, ListConfig):
+        return f"a list such as [{','.join(map(str, node))}]"
+    target = node._maybe_dereference_node()
+    if isinstance(target, DictConfig):
+        return f"given key by key: {' '.join(f'{key}.{name}=...' for name in map(str, target))}"
+    words: dict[type[Node], str] = {
+        BooleanNode: "true or false",
+        IntegerNode: "a whole number",
+        FloatNode: "a number",
+        StringNode: "text",
+    }
+    return words.get(type(node))
+
+
+def _one_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error.__cause__ or error).splitlines()]
+    return "; ".join(
+        line for line in lines if line and not line.startswith(("object_type", "reference_type"))
+    )
