@@ -1,12 +1,17 @@
 """Pairs per second: one renderer for life against the naive way, a new scene and renderer for each pair.
 
-Both draw the same objects in the same poses, in turn, each in a process of its own (deleting a renderer ends the EGL
-display of its process).
+All draw the same objects in the same poses, in turn, each way in a process of its own (deleting a renderer ends the
+EGL display of its process). Rates are per second of processor time, so that other work on the machine counts little.
 """
 
 import argparse
+import os
+import platform
 import time
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
+from functools import partial
+from importlib.metadata import version
 from math import pi
 from multiprocessing import get_context
 
@@ -22,11 +27,11 @@ from stereo_occ.shapes.shape import CATEGORIES
 
 
 def naive(category: str, side: int, pairs: int) -> float:
-    """Seconds for ``pairs`` pairs as in pyrender's own examples."""
+    """Seconds for ``pairs`` pairs as in pyrender's own examples, with its 4x multisampling."""
     pyrender = import_pyrender()
     rig = toed_in_rig(1.0, pi / 16, pi / 3, side)
     mesh = procedural_shape(category, 0, 0).mesh
-    start = time.perf_counter()
+    start = time.process_time()
     for pose in random_poses(pairs):
         scene = pyrender.Scene(bg_color=[1.0, 1.0, 1.0, 0.0])
         scene.add(pyrender.Mesh.from_trimesh(mesh), pose=pose)
@@ -40,19 +45,19 @@ def naive(category: str, side: int, pairs: int) -> float:
             scene.main_camera_node = node
             renderer.render(scene, pyrender.RenderFlags.RGBA)
         renderer.delete()
-    return time.perf_counter() - start
+    return time.process_time() - start
 
 
-def ours(category: str, side: int, pairs: int) -> float:
+def ours(supersampling: int, category: str, side: int, pairs: int) -> float:
     """Seconds for ``pairs`` pairs, loading the object included."""
     rig = toed_in_rig(1.0, pi / 16, pi / 3, side)
     mesh = procedural_shape(category, 0, 0).mesh
-    with StereoRenderer() as renderer:
-        start = time.perf_counter()
+    with StereoRenderer(supersampling) as renderer:
+        start = time.process_time()
         renderer.load(mesh)
         for pose in random_poses(pairs):
             renderer.render(rig, pose, LOOK)
-        return time.perf_counter() - start
+        return time.process_time() - start
 
 
 def random_poses(count: int) -> list[np.ndarray]:
@@ -68,20 +73,27 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=20, help="pairs per object and turn")
     parser.add_argument("--turns", type=int, default=3)
     options = parser.parse_args()
-    print(f"{'side':>5} {'naive pairs/s':>14} {'ours pairs/s':>13} {'ratio':>6}")
-    with (
-        ProcessPoolExecutor(1, mp_context=get_context("spawn")) as first,
-        ProcessPoolExecutor(1, mp_context=get_context("spawn")) as second,
-    ):
+    os.environ |= {"LP_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    versions = ", ".join(f"{name} {version(name)}" for name in ("pyrender", "PyOpenGL", "numpy"))
+    print(f"{versions}, {platform.machine()}, one rasteriser thread; pairs per CPU second (times naive)")
+    ways = {
+        "naive, 4x multisampled": naive,
+        "ours, supersampling 2": partial(ours, 2),
+        "ours, supersampling 1": partial(ours, 1),
+    }
+    print(f"{'side':>5}" + "".join(f"{name:>26}" for name in ways))
+    with ExitStack() as stack:
+        pools = [stack.enter_context(ProcessPoolExecutor(1, get_context("spawn"))) for _ in ways]
         for side in (64, 128):
-            seconds = [0.0, 0.0]
+            seconds = np.zeros(len(ways))
             for turn in range(options.turns + 1):
                 for category in CATEGORIES:
-                    for way, (pool, function) in enumerate(((first, naive), (second, ours))):
-                        spent = pool.submit(function, category, side, options.pairs).result()
-                        seconds[way] += spent if turn else 0.0  # the first turn warms up
-            slow, fast = (options.pairs * len(CATEGORIES) * options.turns / spent for spent in seconds)
-            print(f"{side:>5} {slow:>14.1f} {fast:>13.1f} {fast / slow:>6.1f}", flush=True)
+                    for index, (pool, way) in enumerate(zip(pools, ways.values(), strict=True)):
+                        spent = pool.submit(way, category, side, options.pairs).result()
+                        seconds[index] += spent if turn else 0.0  # the first turn warms up
+            rates = options.pairs * len(CATEGORIES) * options.turns / seconds
+            cells = (f"{rate:.1f} ({rate / rates[0]:.1f})" for rate in rates)
+            print(f"{side:>5}" + "".join(f"{cell:>26}" for cell in cells), flush=True)
 
 
 if __name__ == "__main__":
