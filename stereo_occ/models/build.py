@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable, Mapping
 from difflib import get_close_matches
+from functools import partial
 from typing import Any, TypeVar
 
 import torch
@@ -14,13 +15,20 @@ from stereo_occ.models.base import OccupancyModel
 from stereo_occ.models.cost_volumes import Concat, Correlation, CostVolume, Groupwise, calibrated, one_sided
 from stereo_occ.models.decoders import ONet
 from stereo_occ.models.encoders import DilatedResNet, ImageEncoder, ResNet18
+from stereo_occ.models.light import LightEncoder
 from stereo_occ.models.mono import MonoModel
+from stereo_occ.models.pixel_stereo import PixelStereoModel
+from stereo_occ.models.plane_sweep import PlaneSweepStereoModel
 from stereo_occ.models.stereo import StereoModel
 
 T = TypeVar("T")
 Config = Mapping[str, Any]
 
-ENCODERS: dict[str, type[ImageEncoder]] = {"dilated_resnet": DilatedResNet, "resnet18": ResNet18}
+ENCODERS: dict[str, type[ImageEncoder]] = {
+    "dilated_resnet": DilatedResNet,
+    "resnet18": ResNet18,
+    "light": LightEncoder,
+}
 COST_VOLUMES: dict[str, Callable[..., CostVolume]] = {
     "correlation": Correlation,
     "correlation_signed": Correlation,
@@ -75,7 +83,21 @@ def _mono(config: Config, rig: StereoRig, load_weights: bool) -> MonoModel:
     return MonoModel(encoder, decoder, config["code_size"])
 
 
-MODELS: dict[str, Callable[[Config, StereoRig, bool], OccupancyModel]] = {"stereo": _stereo, "mono": _mono}
+def _calibrated(
+    model: type[PixelStereoModel], config: Config, rig: StereoRig, load_weights: bool
+) -> PixelStereoModel:
+    settings = _keywords(model)
+    _check_settings(config, {"feature_stride", "encoder"} | settings, "model")
+    encoder = _encoder(config["encoder"], rig, config["feature_stride"], load_weights)
+    return model(encoder, **{name: config[name] for name in settings})
+
+
+MODELS: dict[str, Callable[[Config, StereoRig, bool], OccupancyModel]] = {
+    "stereo": _stereo,
+    "mono": _mono,
+    "pixel_stereo": partial(_calibrated, PixelStereoModel),
+    "plane_sweep_stereo": partial(_calibrated, PlaneSweepStereoModel),
+}
 
 
 def _encoder(config: Config, rig: StereoRig, stride: int | None, load_weights: bool) -> ImageEncoder:
@@ -95,14 +117,15 @@ def _part(
 ) -> T:
     """Construct the named part from its settings and, of what is ``given``, what it takes."""
     constructor = _lookup(known, config, key)
-    keywords = {
-        name
-        for name, parameter in inspect.signature(constructor).parameters.items()
-        if parameter.kind is parameter.KEYWORD_ONLY
-    }
+    keywords = _keywords(constructor)
     _check_settings(config, keywords - given.keys(), key)
     settings = {name: value for name, value in config.items() if name != "name"}
     return constructor(*positional, **settings, **{name: given[name] for name in keywords & given.keys()})
+
+
+def _keywords(constructor: Callable[..., Any]) -> set[str]:
+    parameters = inspect.signature(constructor).parameters.values()
+    return {parameter.name for parameter in parameters if parameter.kind is parameter.KEYWORD_ONLY}
 
 
 def _lookup(known: Mapping[str, T], config: Config, key: str) -> T:

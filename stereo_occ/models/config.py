@@ -33,6 +33,16 @@ class ResNet18Config(EncoderConfig):
 
 
 @dataclass
+class LightConfig(EncoderConfig):
+    """Small residual U-Net."""
+
+    name: str = "light"
+    channels: int = MISSING  # of the merged features
+    widths: list[int] = MISSING  # channels of the stages at strides 2, 4, 8, ...
+    blocks: list[int] = MISSING  # residual blocks of each stage
+
+
+@dataclass
 class CostVolumeConfig:
     """A cost volume."""
 
@@ -114,9 +124,33 @@ class MonoConfig:
     decoder: DecoderConfig = MISSING
 
 
+@dataclass
+class PixelStereoConfig:
+    """Every query point looked up in both images with the cameras given."""
+
+    name: str = "pixel_stereo"
+    feature_stride: int = MISSING  # of the sampled features, in image pixels
+    views: str = MISSING  # both; left or left_twice: a single view with the same parameters, for comparison
+    groups: int = MISSING  # of channels, for the correlation
+    frequencies: int = MISSING  # of the positional encoding
+    code_size: int = MISSING  # of the code for the whole pair
+    hidden: int = MISSING  # channels of the decoder
+    blocks: int = MISSING  # residual blocks of the decoder
+    encoder: EncoderConfig = MISSING
+
+
+@dataclass
+class PlaneSweepStereoConfig(PixelStereoConfig):
+    """The same, with a volume over the cube completed by a 3D U-Net."""
+
+    name: str = "plane_sweep_stereo"
+    grid: int = MISSING  # cells per side of the volume
+    widths: list[int] = MISSING  # channels of the U-Net's levels, the finest first
+
+
 SCHEMAS: dict[str, tuple[type, ...]] = {
-    "model": (StereoConfig, MonoConfig),
-    "model/encoder": (DilatedResNetConfig, ResNet18Config),
+    "model": (StereoConfig, MonoConfig, PixelStereoConfig, PlaneSweepStereoConfig),
+    "model/encoder": (DilatedResNetConfig, ResNet18Config, LightConfig),
     "model/cost_volume": (CorrelationConfig, SignedCorrelationConfig, GroupwiseConfig, ConcatConfig),
     "model/decoder": (ONetConfig,),
 }

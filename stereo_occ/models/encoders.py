@@ -63,7 +63,7 @@ class DilatedResNet(ImageEncoder):
                 raise UserError(
                     f"model.encoder.{name}: must be three numbers, one per stage, got {list(values)}"
                 )
-        self.stride = _choose_stride("dilated_resnet", stride, (4, 16))
+        self.stride = choose_stride("dilated_resnet", stride, (4, 16))
         merge = self.stride == 4
         self.channels = channels if merge else widths[-1]
         self.stem = nn.Sequential(
@@ -111,7 +111,7 @@ class ResNet18(ImageEncoder):
 
     def __init__(self, *, stride: int | None, weights: str | None, load_weights: bool) -> None:
         super().__init__()
-        self.stride = _choose_stride("resnet18", stride, (4, 8, 16, 32))
+        self.stride = choose_stride("resnet18", stride, (4, 8, 16, 32))
         source = named_weights(weights) if weights else None
         network = resnet18()
         if source and load_weights:
@@ -143,7 +143,7 @@ def _double(x_BCHW: Tensor) -> Tensor:
     return interpolate(x_BCHW, scale_factor=2.0, mode="bilinear", align_corners=False)
 
 
-def _choose_stride(encoder: str, stride: int | None, strides: Sequence[int]) -> int:
+def choose_stride(encoder: str, stride: int | None, strides: Sequence[int]) -> int:
     if stride is None:
         return strides[-1]
     if stride not in strides:

@@ -9,9 +9,11 @@ from torchvision.models import ResNet18_Weights, resnet18
 
 from stereo_occ.errors import UserError
 from stereo_occ.models.encoders import DilatedResNet, ResNet18
+from stereo_occ.models.light import LightEncoder
 from stereo_occ.models.residual import DilatedConv, ResidualBlock
 
 DILATED = {"channels": 16, "widths": [32, 64, 128], "blocks": [3, 4, 8], "dilations": [1, 2, 5, 9]}
+LIGHT = {"channels": 32, "widths": [16, 32, 64, 128], "blocks": [1, 2, 2, 2]}
 WEIGHTS_FILE = "resnet18-f37072fd.pth"
 
 
@@ -38,6 +40,9 @@ def torch_cache(tmp_path, monkeypatch):
         (ResNet18(stride=4, weights=None, load_weights=True), (64, 16, 16)),
         (ResNet18(stride=16, weights=None, load_weights=True), (256, 4, 4)),
         (ResNet18(stride=None, weights=None, load_weights=True), (512, 2, 2)),
+        (LightEncoder(stride=2, **LIGHT), (32, 32, 32)),
+        (LightEncoder(stride=4, **LIGHT), (32, 16, 16)),
+        (LightEncoder(stride=None, **LIGHT), (128, 4, 4)),
     ],
 )
 def test_features_are_what_the_attributes_say(encoder, shape):
@@ -51,6 +56,7 @@ def test_features_are_what_the_attributes_say(encoder, shape):
     [
         (DilatedResNet(stride=4, channels=16, widths=[8, 8, 8], blocks=[1, 1, 1], dilations=[1]), 16),
         (ResNet18(stride=4, weights=None, load_weights=True), 4),
+        (LightEncoder(stride=4, channels=16, widths=[8, 8, 8, 8], blocks=[1, 1, 1, 1]), 16),
     ],
 )
 def test_an_image_shifted_by_pixels_shifts_its_features_by_pixels_over_the_stride(encoder, step):
@@ -92,7 +98,11 @@ def test_a_residual_block_without_last_convolution_is_its_shortcut():
 
 
 def test_images_from_scratch_are_centred():
-    for encoder in (DilatedResNet(stride=4, **DILATED), ResNet18(stride=4, weights=None, load_weights=True)):
+    for encoder in (
+        DilatedResNet(stride=4, **DILATED),
+        ResNet18(stride=4, weights=None, load_weights=True),
+        LightEncoder(stride=4, **LIGHT),
+    ):
         first = next(m for m in encoder.modules() if isinstance(m, torch.nn.Conv2d))
         seen = []
         first.register_forward_hook(lambda module, inputs, output, seen=seen: seen.append(inputs[0]))
@@ -137,6 +147,23 @@ def test_a_stride_that_is_not_there_is_refused():
         UserError, match=r"model\.feature_stride: dilated_resnet has features at strides \[4, 16\], got 8"
     ):
         DilatedResNet(stride=8, **DILATED)
+
+
+@pytest.mark.parametrize(("stride", "pixels"), [(2, 250), (4, 250)])
+def test_a_light_feature_sees_the_whole_of_a_large_image(stride, pixels):
+    encoder = LightEncoder(stride=stride, **LIGHT).double().eval()
+    image = torch.rand(1, 3, 16, 512, dtype=torch.double, requires_grad=True)
+    features = encoder(image)
+    (gradient,) = torch.autograd.grad(features[0, :, 0, features.shape[-1] // 2].square().sum(), image)
+    seen = gradient.abs().sum(dim=(0, 1, 2)).nonzero()
+    assert seen.max() - seen.min() >= pixels
+
+
+def test_light_stages_must_be_four():
+    with pytest.raises(
+        UserError, match=r"model\.encoder\.widths: must be four numbers, one per stage, got \[8"
+    ):
+        LightEncoder(stride=4, channels=8, widths=[8, 8, 8], blocks=[1, 1, 1, 1])
 
 
 def test_stages_must_be_three():

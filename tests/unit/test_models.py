@@ -79,6 +79,12 @@ def leave_zero(model):
         (["model/cost_volume=concat"], "laptop", 64, 4_973_065),
         (["model/encoder=resnet18", SCRATCH], "laptop", 64, 2_316_089),
         (["model=mono", "model/encoder=dilated_resnet"], "laptop", 64, 4_492_769),
+        (["model=pixel_stereo"], "laptop", 64, 1_208_497),
+        (["model=pixel_stereo", "model.feature_stride=2"], "laptop", 64, 1_227_601),
+        (["model=plane_sweep_stereo"], "laptop", 64, 2_989_761),
+        (["model=plane_sweep_stereo"], "paper", 224, 2_989_761),
+        (["model=plane_sweep_stereo", "model.views=left"], "laptop", 64, 2_989_761),
+        (["model=plane_sweep_stereo", "model/encoder=dilated_resnet"], "laptop", 64, 4_872_353),
     ],
 )
 def test_parameter_counts(overrides, scale, side, count):
@@ -92,9 +98,9 @@ def test_every_shipped_file_is_tested_and_every_name_is_shipped(kind):
 
 
 @pytest.mark.parametrize("encoder", ENCODERS)
-@pytest.mark.parametrize("name", ["mono", *COST_VOLUMES])
+@pytest.mark.parametrize("name", ["mono", "pixel_stereo", "plane_sweep_stereo", *COST_VOLUMES])
 def test_every_combination_builds_and_every_parameter_learns(name, encoder):
-    choice = ["model=mono"] if name == "mono" else ["model=stereo", f"model/cost_volume={name}"]
+    choice = [f"model={name}"] if name in MODELS else ["model=stereo", f"model/cost_volume={name}"]
     scratch = [SCRATCH] if encoder == "resnet18" else []
     model = leave_zero(build(*choice, f"model/encoder={encoder}", *scratch))
     points = torch.rand(3, 40, 3) - 0.5
@@ -176,6 +182,8 @@ def test_null_disparities_take_the_range_of_the_rig():
     [
         (["model.widht=8"], "widht"),
         (["model.encoder.chanels=8"], "chanels"),
+        (["model=pixel_stereo", "model.gird=8"], "gird"),
+        (["model=pixel_stereo", "+model/cost_volume=concat"], "'cost_volume' not in 'PixelStereoConfig'"),
         (["model.width=wide"], "full_key: model.width"),
         (["model.cost_volume.disparities=[1]"], "full_key: model.cost_volume.disparities"),
         (["model=mono", "model/cost_volume=concat"], "No match in the defaults list"),
@@ -201,11 +209,15 @@ def changed(path, value):
 @pytest.mark.parametrize(
     ("path", "value", "message"),
     [
-        ("name", "sterio", "model: unknown 'sterio'; known are stereo, mono; did you mean stereo?"),
+        (
+            "name",
+            "sterio",
+            "model: unknown 'sterio'; known are stereo, mono, pixel_stereo, plane_sweep_stereo; did",
+        ),
         (
             "encoder.name",
             "resnet81",
-            "model.encoder: unknown 'resnet81'; known are dilated_resnet, resnet18; did you",
+            "model.encoder: unknown 'resnet81'; known are dilated_resnet, resnet18, light; did you",
         ),
         ("cost_volume.name", "concatenate", "did you mean concat?"),
         ("decoder.name", "os.system", "model.decoder: unknown 'os.system'; known are onet"),

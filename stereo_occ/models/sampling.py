@@ -1,0 +1,102 @@
+"""Where rig-frame points are in each view, and the features there.
+
+Here and in the modules that use it, V counts the views. Coordinates are float32 under autocast too: half precision
+misses the right cell of a large map.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn.functional import grid_sample, normalize
+
+from stereo_occ.geometry.camera import normalize_pixels, project
+
+NEAREST = 0.05  # metres; what is not at least this far in front of a camera is not seen
+
+
+@dataclass(frozen=True)
+class Projections:
+    """Points as V cameras see them.
+
+    Attributes:
+        positions_VBN2: where in the image, -1 and 1 at its outer edges; beyond them, up to -2 and 2.
+        visible_VBN: 1 inside the image and in front of the camera, 0 elsewhere.
+        offsets_VBN3: from the fixation point to the point along the camera's axes, metres.
+        depths_VBN: along the optical axis, metres, at least ``NEAREST``.
+    """
+
+    positions_VBN2: Tensor
+    visible_VBN: Tensor
+    offsets_VBN3: Tensor
+    depths_VBN: Tensor
+
+
+def project_points(
+    points_BN3: Tensor, K_VB33: Tensor, camera_from_rig_VB44: Tensor, width: int, height: int
+) -> Projections:
+    """Project rig-frame points, metres, with each sample's own cameras into images of that size in pixels."""
+    with torch.autocast(points_BN3.device.type, enabled=False):
+        points_BN3, camera_from_rig_VB44 = points_BN3.float(), camera_from_rig_VB44.float()
+        pixels_VBN2, depths_VBN = project(points_BN3, K_VB33.float(), camera_from_rig_VB44)
+        in_front_VBN = depths_VBN >= NEAREST
+        positions_VBN2 = normalize_pixels(pixels_VBN2, width, height)
+        positions_VBN2 = torch.where(in_front_VBN[..., None], positions_VBN2, 2.0).clamp(-2, 2)
+        visible_VBN = in_front_VBN & (positions_VBN2.abs() <= 1).all(dim=-1)
+        offsets_VBN3 = points_BN3 @ camera_from_rig_VB44[..., :3, :3].mT
+    return Projections(positions_VBN2, visible_VBN.float(), offsets_VBN3, depths_VBN.clamp(min=NEAREST))
+
+
+def sample_maps(features_VBCHW: Tensor, positions_VBN2: Tensor) -> Tensor:
+    """Features ``(V, B, N, C)`` at positions of maps of any stride, bilinear, float32; the edge's own beyond it."""
+    V, B, N, _ = positions_VBN2.shape
+    samples_MCN1 = grid_sample(
+        features_VBCHW.float().flatten(0, 1),
+        positions_VBN2.view(V * B, N, 1, 2),
+        padding_mode="border",
+        align_corners=False,
+    )
+    return samples_MCN1.squeeze(-1).mT.reshape(V, B, N, -1)
+
+
+def cell_centers(cells: int) -> Tensor:
+    """Centres ``(cells^3, 3)``, metres, of a grid over the working volume; z outermost, x innermost."""
+    centers = (torch.arange(cells) + 0.5) / cells - 0.5
+    z, y, x = torch.meshgrid(centers, centers, centers, indexing="ij")
+    return torch.stack([x, y, z], dim=-1).view(-1, 3)
+
+
+def sample_volume(volume_BCDHW: Tensor, points_BN3: Tensor) -> Tensor:
+    """Features ``(B, N, C)`` of a volume over the grid of :func:`cell_centers`, trilinear, float32."""
+    B, N, _ = points_BN3.shape
+    samples_BCN11 = grid_sample(
+        volume_BCDHW.float(),
+        2 * points_BN3.float().view(B, N, 1, 1, 3),
+        padding_mode="border",
+        align_corners=False,
+    )
+    return samples_BCN11.flatten(2).mT
+
+
+def ray_maps(K_VB33: Tensor, camera_from_rig_VB44: Tensor, height: int, width: int, stride: int) -> Tensor:
+    """Pluecker coordinates ``(V, B, 6, height, width)`` of the lines of sight through a map's cells.
+
+    The unit direction in the rig frame, then the moment about the fixation point, metres: with them a map says where
+    its camera is (Sitzmann et al., "Light Field Networks", NeurIPS 2021).
+
+    Args:
+        height, width: of the map.
+        stride: image pixels per cell.
+    """
+    device = K_VB33.device
+    with torch.autocast(device.type, enabled=False):
+        u, v = (stride * torch.arange(n, device=device) + (stride - 1) / 2 for n in (width, height))
+        v_HW, u_HW = torch.meshgrid(v, u, indexing="ij")
+        pixels_P3 = torch.stack([u_HW, v_HW, torch.ones_like(u_HW)], dim=-1).view(-1, 3)
+        R_VB33, t_VB3 = camera_from_rig_VB44[..., :3, :3].float(), camera_from_rig_VB44[..., :3, 3].float()
+        directions_VBP3 = pixels_P3 @ torch.linalg.inv(K_VB33.float()).mT @ R_VB33
+        directions_VBP3 = normalize(directions_VBP3, dim=-1)
+        centers_VB13 = -(t_VB3[..., None, :] @ R_VB33)
+        moments_VBP3 = torch.linalg.cross(centers_VB13.expand_as(directions_VBP3), directions_VBP3)
+    rays_VBP6 = torch.cat([directions_VBP3, moments_VBP3], dim=-1)
+    return rays_VBP6.mT.reshape(*K_VB33.shape[:2], 6, height, width)

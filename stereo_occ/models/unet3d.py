@@ -1,0 +1,69 @@
+"""A small residual 3D U-Net."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from torch import Tensor, nn
+from torch.nn.functional import interpolate
+
+
+class ResidualBlock3d(nn.Module):
+    """Two 3x3x3 convolutions, each after batch norm and ReLU, beside the identity."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(
+            *_normalized_conv(channels, channels), *_normalized_conv(channels, channels)
+        )
+
+    def forward(self, x_BCDHW: Tensor) -> Tensor:
+        """Same shape."""
+        residual_BCDHW: Tensor = self.layers(x_BCDHW)
+        return residual_BCDHW.add_(x_BCDHW)
+
+
+class UNet3d(nn.Module):
+    """Volume to volume of the same size, seen at ever coarser grids and merged back (Cicek et al., "3D U-Net", 2016).
+
+    Args:
+        widths: channels of each level, the finest first; each level has half the cells per side of the one before.
+        out_channels: of the result.
+
+    Attributes:
+        multiple: sides must be a multiple of this many cells.
+    """
+
+    def __init__(self, widths: Sequence[int], out_channels: int) -> None:
+        super().__init__()
+        self.multiple = 2 ** (len(widths) - 1)
+        self.entry = ResidualBlock3d(widths[0])
+        self.down = nn.ModuleList(
+            nn.Sequential(*_normalized_conv(fine, coarse, stride=2), ResidualBlock3d(coarse))
+            for fine, coarse in pairwise(widths)
+        )
+        self.lift = nn.ModuleList(nn.Conv3d(coarse, fine, 1, bias=False) for fine, coarse in pairwise(widths))
+        self.up = nn.ModuleList(ResidualBlock3d(fine) for fine in widths[:-1])
+        self.exit = nn.Sequential(
+            nn.BatchNorm3d(widths[0]), nn.ReLU(inplace=True), nn.Conv3d(widths[0], out_channels, 1)
+        )
+
+    def forward(self, volume_BCDHW: Tensor) -> Tensor:
+        """``(B, widths[0], D, H, W)`` to ``(B, out_channels, D, H, W)``."""
+        x_BCDHW = self.entry(volume_BCDHW)
+        finer = []
+        for down in self.down:
+            finer.append(x_BCDHW)
+            x_BCDHW = down(x_BCDHW)
+        for lift, up in zip(reversed(self.lift), reversed(self.up), strict=True):
+            lifted_BCDHW = interpolate(lift(x_BCDHW), scale_factor=2.0, mode="trilinear", align_corners=False)
+            x_BCDHW = up(finer.pop() + lifted_BCDHW)
+        volume: Tensor = self.exit(x_BCDHW)
+        return volume
+
+
+def _normalized_conv(in_channels: int, channels: int, stride: int = 1) -> list[nn.Module]:
+    return [
+        nn.BatchNorm3d(in_channels),
+        nn.ReLU(inplace=True),
+        nn.Conv3d(in_channels, channels, 3, stride=stride, padding=1, bias=False),
+    ]
