@@ -1,5 +1,6 @@
 """What a run shows in TensorBoard beyond its losses: pairs, meshes, precision-recall, hyper-parameters."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import lightning
@@ -7,8 +8,10 @@ import numpy as np
 import torch
 from lightning.pytorch import LightningModule
 from lightning.pytorch.callbacks import Callback
+from lightning.pytorch.loggers import TensorBoardLogger
 from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
+from torch.utils.tensorboard.summary import hparams
 from trimesh import Trimesh
 
 from stereo_occ.config import LoggerConfig
@@ -19,6 +22,14 @@ from stereo_occ.task import OccupancyTask
 
 CURVE_POINTS = 512  # per view
 HPARAM_METRICS = ("val/iou", "val/iou_bbox", "val/iou_unrotated", "val/loss")
+
+
+class StepLogger(TensorBoardLogger):
+    """TensorBoard with the steps taken on the horizontal axis; Lightning counts the first one as 0."""
+
+    def log_metrics(self, metrics: Mapping[str, float], step: int | None = None) -> None:
+        scalars = {name: value for name, value in metrics.items() if name != "epoch"}
+        super().log_metrics(scalars, None if step is None else step + 1)
 
 
 class ShowInTensorBoard(Callback):
@@ -63,9 +74,10 @@ class ShowInTensorBoard(Callback):
         self._truth_shown = True
 
     def on_fit_end(self, trainer: lightning.Trainer, pl_module: LightningModule) -> None:
-        metrics = {name: float(trainer.callback_metrics[name]) for name in HPARAM_METRICS}
-        assert trainer.logger is not None
-        trainer.logger.log_hyperparams(flatten(self.hyper_parameters), metrics)
+        # The table reads the values from the curves; torch's add_hparams would write them again, as step 0.
+        metrics = dict.fromkeys(HPARAM_METRICS, 0.0)
+        for summary in hparams(flatten(self.hyper_parameters), metrics):  # type: ignore[no-untyped-call]
+            _writer(trainer)._get_file_writer().add_summary(summary)  # type: ignore[no-untyped-call]
 
 
 def flatten(config: dict[str, Any], prefix: str = "") -> dict[str, str | int | float | bool]:

@@ -6,7 +6,6 @@ import lightning
 import torch
 from hydra.core.hydra_config import HydraConfig
 from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelCheckpoint, TQDMProgressBar
-from lightning.pytorch.loggers import TensorBoardLogger
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.checkpoint import StoreConfig, build_task, plain
@@ -15,24 +14,28 @@ from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
 from stereo_occ.data.datamodule import PairsDataModule
 from stereo_occ.metrics_file import WriteMetrics
-from stereo_occ.tensorboard import ShowInTensorBoard
+from stereo_occ.quiet import quiet_lightning
+from stereo_occ.resume import AtomicCheckpoints, SaveLatest, step_to_resume
+from stereo_occ.tensorboard import ShowInTensorBoard, StepLogger
 
 
 def train(cfg: DictConfig, folder: Path) -> lightning.Trainer:
     """Train ``cfg`` in ``folder``, from its latest checkpoint if ``resume=auto`` and there is one."""
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
+    quiet_lightning()
     if typed.trainer.threads:
         torch.set_num_threads(typed.trainer.threads)
+    latest = folder / "last.ckpt"
+    resume = typed.resume is Resume.auto and latest.exists()
+    step = step_to_resume(latest, plain(cfg)) if resume else 0
+    lightning.seed_everything(typed.seed, verbose=False)
+    task = build_task(cfg, load_weights=not resume)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "config.yaml").write_text(OmegaConf.to_yaml(cfg, resolve=True))
     data = build_data(typed)
     data.prepare_data()
-    lightning.seed_everything(typed.seed, verbose=False)
-    task = build_task(cfg)
-    trainer = build_trainer(typed, folder, build_callbacks(cfg, typed, folder))
-    latest = folder / "last.ckpt"
-    resume = typed.resume is Resume.auto and latest.exists()
+    trainer = build_trainer(typed, folder, build_callbacks(cfg, typed, folder), step)
     trainer.fit(task, data, ckpt_path=latest if resume else None, weights_only=True)
     return trainer
 
@@ -64,12 +67,7 @@ def build_callbacks(cfg: DictConfig, typed: TrainConfig, folder: Path) -> list[C
             auto_insert_metric_name=False,
             enable_version_counter=False,
         ),
-        ModelCheckpoint(
-            folder,
-            filename="last",
-            every_n_train_steps=validation.checkpoint_interval,
-            enable_version_counter=False,
-        ),
+        SaveLatest(folder / "last.ckpt", validation.checkpoint_interval, validation.interval),
         WriteMetrics(folder / "metrics.json"),
     ]
     if validation.keep_all:
@@ -93,8 +91,14 @@ def build_callbacks(cfg: DictConfig, typed: TrainConfig, folder: Path) -> list[C
     return callbacks
 
 
-def build_trainer(typed: TrainConfig, folder: Path, callbacks: list[Callback]) -> lightning.Trainer:
-    """A trainer of exactly ``steps`` optimiser steps that validates every ``validation.interval`` of them."""
+def build_trainer(
+    typed: TrainConfig, folder: Path, callbacks: list[Callback], step: int
+) -> lightning.Trainer:
+    """A trainer of exactly ``steps`` optimiser steps that validates every ``validation.interval`` of them.
+
+    Args:
+        step: that the run continues from; TensorBoard forgets what an earlier part has logged after it.
+    """
     return lightning.Trainer(
         accelerator=typed.trainer.accelerator,
         devices=typed.trainer.devices,
@@ -105,11 +109,12 @@ def build_trainer(typed: TrainConfig, folder: Path, callbacks: list[Callback]) -
         check_val_every_n_epoch=None,
         num_sanity_val_steps=0,
         gradient_clip_val=typed.trainer.gradient_clip,
-        log_every_n_steps=typed.logger.interval,
-        logger=TensorBoardLogger(folder, name="", version="tensorboard")
+        log_every_n_steps=min(typed.logger.interval, typed.steps),
+        logger=StepLogger(folder, name="", version="tensorboard", purge_step=step + 1)
         if typed.logger.tensorboard
         else False,
         callbacks=callbacks,
+        plugins=AtomicCheckpoints(),
         enable_progress_bar=typed.progress,
         enable_model_summary=False,
         use_distributed_sampler=False,

@@ -1,0 +1,84 @@
+"""Runs that are stopped at any moment and go on as if they had not been."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import torch
+from lightning.fabric.plugins import TorchCheckpointIO
+from lightning.pytorch import LightningModule, Trainer
+from lightning.pytorch.callbacks import Checkpoint
+
+from stereo_occ.checkpoint import KEY, read_checkpoint
+from stereo_occ.errors import UserError
+
+#: What must not change between the parts of a run. Hardware, logging and the length of the run may.
+FIXED = (
+    "data", "rig", "placement", "lights", "material", "background", "categories",
+    "model", "queries", "optimizer", "seed", "points", "batch_size",
+)  # fmt: skip
+
+
+class SaveLatest(Checkpoint):
+    """Keeps the latest state in ``path``: every ``interval`` steps and at the end.
+
+    Where a validation is due at the same step it is saved after it, so that a resumed run neither skips nor repeats
+    it, and knows its result.
+    """
+
+    def __init__(self, path: Path, interval: int, validation_interval: int) -> None:
+        self.path = path
+        self.interval = interval
+        self.validation_interval = validation_interval
+
+    def on_train_batch_end(self, trainer: Trainer, *_: Any) -> None:
+        if trainer.global_step % self.validation_interval:
+            self._save(trainer)
+
+    def on_validation_end(self, trainer: Trainer, pl_module: LightningModule) -> None:
+        self._save(trainer)
+
+    def _save(self, trainer: Trainer) -> None:
+        if trainer.global_step % self.interval == 0 or trainer.global_step == trainer.max_steps:
+            trainer.save_checkpoint(self.path)
+
+
+class AtomicCheckpoints(TorchCheckpointIO):
+    """Writes a checkpoint beside its place and moves it there when it is whole, within one file system."""
+
+    def save_checkpoint(self, checkpoint: dict[str, Any], path: Any, storage_options: Any = None) -> None:
+        """Save ``checkpoint`` so that ``path`` holds the old or the new one, whatever interrupts the saving.
+
+        Raises:
+            UserError: the disk is full or the folder cannot be written.
+        """
+        target = Path(path)
+        temporary = target.with_name(f".{target.name}.part")
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with temporary.open("wb") as file:
+                torch.save(checkpoint, file)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(target)
+        except (OSError, RuntimeError) as error:  # torch's own writer raises RuntimeError
+            temporary.unlink(missing_ok=True)
+            raise UserError(
+                f"{target}: cannot write the checkpoint ({error}); free some disk space"
+            ) from error
+
+
+def step_to_resume(checkpoint: Path, config: dict[str, Any]) -> int:
+    """The step that ``checkpoint`` was saved at, if it is of the run that ``config`` (plain values) describes.
+
+    Raises:
+        UserError: it is damaged, or of a run with other settings.
+    """
+    saved = read_checkpoint(checkpoint)
+    changed = [name for name in FIXED if saved[KEY]["config"].get(name) != config[name]]
+    if changed:
+        raise UserError(
+            f"{checkpoint.parent}: holds a run with another {', '.join(changed)}; "
+            f"choose another hydra.run.dir, or resume=never to start over"
+        )
+    return int(saved["global_step"])
