@@ -61,11 +61,15 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     except Exception as error:
         reason = next(iter(str(error).splitlines()), type(error).__name__)
         raise UserError(
-            f"checkpoint={path}: cannot be read ({reason}); give a checkpoint of a training run"
+            f"checkpoint={path}: cannot be read ({reason}); give the best.ckpt or last.ckpt of a training run"
         ) from error
-    version = checkpoint.get(KEY, {}).get("version")
-    if version != VERSION:
+    ours = checkpoint.get(KEY) if isinstance(checkpoint, dict) else None
+    if not isinstance(ours, dict):
         raise UserError(
-            f"checkpoint={path}: has format version {version}, expected {VERSION}; train it again"
+            f"checkpoint={path}: is no checkpoint of a training run; give its best.ckpt or last.ckpt"
+        )
+    if ours.get("version") != VERSION:
+        raise UserError(
+            f"checkpoint={path}: has format version {ours.get('version')}, expected {VERSION}; train it again"
         )
     return dict(checkpoint)

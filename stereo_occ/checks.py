@@ -11,7 +11,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.config import SplitKind
 from stereo_occ.data.prepare import build_rig
-from stereo_occ.data.splits import SUBSETS, subset_sizes
+from stereo_occ.data.splits import SUBSETS, split_views, subset_sizes
 from stereo_occ.errors import UserError
 from stereo_occ.models.build import build_model
 from stereo_occ.optimization import OPTIMIZERS, SCHEDULES
@@ -118,6 +118,8 @@ def _split(cfg: DictConfig) -> Iterator[str]:
         yield f"data.fractions={data.fractions}: training needs a share for train and one for val"
     elif data.split is SplitKind.view:
         yield from _refusal(subset_sizes, data.views, data.fractions, "data.views")
+        if data.views >= 3 and cfg.validation.views > len(split_views(data.views, data.fractions, "val")):
+            yield f"validation.views={cfg.validation.views}: data.split=view leaves fewer of data.views={data.views}"
     elif data.name == "procedural":
         for name in cfg.categories.names:
             yield from _refusal(subset_sizes, data.counts[name], data.fractions, f"data.counts.{name}")

@@ -13,14 +13,16 @@ from omegaconf import DictConfig, OmegaConf
 from PIL import Image
 
 from stereo_occ.checkpoint import KEY, build_task, read_checkpoint
-from stereo_occ.checks import check_evaluation
+from stereo_occ.checks import check_evaluation, check_pairs
 from stereo_occ.cli import entry_point
 from stereo_occ.config import EvaluateConfig, TrainConfig, training_config
 from stereo_occ.data.datamodule import PairsDataModule
 from stereo_occ.data.examples import examples
 from stereo_occ.data.prepare import build_rig
+from stereo_occ.errors import UserError
 from stereo_occ.metrics_file import environment, write_json
 from stereo_occ.pictures import comparison
+from stereo_occ.quiet import quiet_lightning
 from stereo_occ.reconstruction import reconstruct
 from stereo_occ.task import OccupancyTask
 
@@ -35,15 +37,16 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     Returns:
         The metrics, with the keys of ``metrics.json``'s ``metrics``.
     """
-    settings = OmegaConf.to_object(cfg)
-    assert isinstance(settings, EvaluateConfig)
+    quiet_lightning()
+    settings = own_settings(cfg)
     if settings.trainer.threads:
         torch.set_num_threads(settings.trainer.threads)
     checkpoint = read_checkpoint(Path(settings.checkpoint))
     trained = training_config(checkpoint[KEY]["config"])
     task = build_task(trained, load_weights=False)
-    task.load_state_dict(checkpoint["state_dict"])
+    load_weights(task, checkpoint["state_dict"], settings.checkpoint)
     data = build_data(cfg, settings, trained)
+    folder.mkdir(parents=True, exist_ok=True)
     trainer = lightning.Trainer(
         accelerator=settings.trainer.accelerator,
         devices=settings.trainer.devices,
@@ -62,13 +65,45 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     return metrics
 
 
+def own_settings(cfg: DictConfig) -> EvaluateConfig:
+    """The settings without the groups that complete the checkpoint's: these may refer to its values."""
+    own = cfg.copy()
+    for group in GROUPS:
+        own[group] = None
+    settings = OmegaConf.to_object(own)
+    assert isinstance(settings, EvaluateConfig)
+    return settings
+
+
+def load_weights(task: OccupancyTask, state_dict: dict[str, Any], path: str) -> None:
+    """Load the weights of a checkpoint."""
+    try:
+        task.load_state_dict(state_dict)
+    except RuntimeError as error:
+        raise UserError(
+            f"checkpoint={path}: its weights do not fit its configuration; it was written by another version"
+        ) from error
+
+
 def build_data(cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig) -> PairsDataModule:
-    """The checkpoint's own data, with the groups replaced that the command line gives."""
+    """The checkpoint's own data, with the groups replaced that the command line gives.
+
+    Raises:
+        UserError: with all problems of the combination.
+    """
     pairs = trained.copy()
     for group in GROUPS:
         if cfg[group] is not None:
             pairs[group] = cfg[group]
+    if cfg.data is not None:
+        if OmegaConf.is_interpolation(cfg.data, "views"):
+            pairs.data.views = settings.views  # no more than are looked at
+        if OmegaConf.is_interpolation(cfg.data, "image_side"):
+            pairs.data.image_side = trained.data.image_side
     pairs.paths, pairs.workers = cfg.paths, cfg.workers
+    problems = check_pairs(pairs)
+    if problems:
+        raise UserError("; ".join(problems))
     typed = OmegaConf.to_object(pairs)
     assert isinstance(typed, TrainConfig)
     return PairsDataModule(

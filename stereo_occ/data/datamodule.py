@@ -100,6 +100,14 @@ class PairsDataModule(lightning.LightningDataModule):
     def evaluation_dataset(self, subset: str) -> EvaluationPairs:
         """The first ``evaluation_views`` poses of each object of a subset, with fixed points."""
         shards, views = self.subset(subset)
+        if not shards:
+            raise UserError(
+                f"subset={subset}: holds no objects with data.fractions={self.pairs.data.fractions}"
+            )
+        if len(views) < self.evaluation_views:
+            raise UserError(
+                f"views={self.evaluation_views}: there are only {len(views)} of each object in {subset}; ask for fewer"
+            )
         return EvaluationPairs(shards, views[: self.evaluation_views], self.evaluation_points)
 
     def _loader(self, dataset: TrainingPairs | EvaluationPairs, **kwargs: Any) -> DataLoader[Batch]:
