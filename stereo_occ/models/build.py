@@ -20,6 +20,7 @@ from stereo_occ.models.mono import MonoModel
 from stereo_occ.models.pixel_stereo import PixelStereoModel
 from stereo_occ.models.plane_sweep import PlaneSweepStereoModel
 from stereo_occ.models.stereo import StereoModel
+from stereo_occ.models.timm_encoder import TimmEncoder
 
 T = TypeVar("T")
 Config = Mapping[str, Any]
@@ -28,6 +29,7 @@ ENCODERS: dict[str, type[ImageEncoder]] = {
     "dilated_resnet": DilatedResNet,
     "resnet18": ResNet18,
     "light": LightEncoder,
+    "timm": TimmEncoder,
 }
 COST_VOLUMES: dict[str, Callable[..., CostVolume]] = {
     "correlation": Correlation,
@@ -144,5 +146,5 @@ def _check_settings(config: Config, expected: set[str], key: str) -> None:
         raise UserError(f"{key}={config['name']}: {problem}; it takes {', '.join(sorted(expected))}")
     for name, value in config.items():
         numbers = value if isinstance(value, list) else [value]
-        if any(isinstance(number, int) and number < 1 for number in numbers):
+        if any(type(number) is int and number < 1 for number in numbers):
             raise UserError(f"{key}.{name}: must be at least 1, got {value}")

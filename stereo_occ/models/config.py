@@ -43,6 +43,16 @@ class LightConfig(EncoderConfig):
 
 
 @dataclass
+class TimmConfig(EncoderConfig):
+    """A backbone of the timm package."""
+
+    name: str = "timm"
+    channels: int = MISSING  # of the merged features
+    backbone: str = MISSING  # name in timm.list_models()
+    pretrained: bool = MISSING  # start from timm's weights
+
+
+@dataclass
 class CostVolumeConfig:
     """A cost volume."""
 
@@ -150,7 +160,7 @@ class PlaneSweepStereoConfig(PixelStereoConfig):
 
 SCHEMAS: dict[str, tuple[type, ...]] = {
     "model": (StereoConfig, MonoConfig, PixelStereoConfig, PlaneSweepStereoConfig),
-    "model/encoder": (DilatedResNetConfig, ResNet18Config, LightConfig),
+    "model/encoder": (DilatedResNetConfig, ResNet18Config, LightConfig, TimmConfig),
     "model/cost_volume": (CorrelationConfig, SignedCorrelationConfig, GroupwiseConfig, ConcatConfig),
     "model/decoder": (ONetConfig,),
 }

@@ -1,16 +1,20 @@
 """Image encoders."""
 
+import sys
+from types import ModuleType, SimpleNamespace
 from urllib.error import URLError
 
 import pytest
 import torch
-from torch.nn.functional import conv2d
+from torch import nn
+from torch.nn.functional import avg_pool2d, conv2d
 from torchvision.models import ResNet18_Weights, resnet18
 
 from stereo_occ.errors import UserError
 from stereo_occ.models.encoders import DilatedResNet, ResNet18
 from stereo_occ.models.light import LightEncoder
 from stereo_occ.models.residual import DilatedConv, ResidualBlock
+from stereo_occ.models.timm_encoder import TimmEncoder
 
 DILATED = {"channels": 16, "widths": [32, 64, 128], "blocks": [3, 4, 8], "dilations": [1, 2, 5, 9]}
 LIGHT = {"channels": 32, "widths": [16, 32, 64, 128], "blocks": [1, 2, 2, 2]}
@@ -169,3 +173,84 @@ def test_light_stages_must_be_four():
 def test_stages_must_be_three():
     with pytest.raises(UserError, match=r"model\.encoder\.blocks: must be three numbers"):
         DilatedResNet(stride=4, **{**DILATED, "blocks": [3, 4]})
+
+
+class Backbone(nn.Module):
+    """Pooled images in the form of timm's ``features_only`` networks, at given strides."""
+
+    def __init__(self, strides, output_fmt="NCHW"):
+        super().__init__()
+        self.strides, self.output_fmt = strides, output_fmt
+        self.feature_info = SimpleNamespace(
+            reduction=lambda: list(strides), channels=lambda: [3 * stride for stride in strides]
+        )
+        self.pretrained_cfg = {"mean": (0.4, 0.5, 0.6), "std": (0.1, 0.2, 0.3)}
+
+    def forward(self, image):
+        maps = [avg_pool2d(image, stride).repeat(1, stride, 1, 1) for stride in self.strides]
+        return [m.permute(0, 2, 3, 1) for m in maps] if self.output_fmt == "NHWC" else maps
+
+
+TIMM = {"channels": 8, "backbone": "pool", "pretrained": False, "load_weights": True}
+
+
+@pytest.fixture
+def timm(monkeypatch):
+    """A timm that knows one backbone and records what it was asked for."""
+    module = ModuleType("timm")
+    module.asked = []
+    module.backbone = Backbone([2, 4, 8, 16, 32])
+
+    def create_model(name, *, pretrained, features_only):
+        module.asked.append((name, pretrained, features_only))
+        if name != "pool":
+            raise RuntimeError(f"Unknown model ({name})")
+        return module.backbone
+
+    module.create_model = create_model
+    monkeypatch.setitem(sys.modules, "timm", module)
+    return module
+
+
+@pytest.mark.parametrize(("stride", "shape"), [(4, (8, 16, 16)), (2, (8, 32, 32)), (None, (96, 2, 2))])
+@pytest.mark.parametrize("output_fmt", ["NCHW", "NHWC"])
+def test_maps_of_timm_are_merged_to_the_stride(timm, stride, shape, output_fmt):
+    timm.backbone = Backbone([2, 4, 8, 16, 32], output_fmt)
+    encoder = TimmEncoder(stride=stride, **TIMM).eval()
+    assert (encoder.channels, 64 // encoder.stride) == shape[:2]
+    image = torch.rand(2, 3, 64, 64)
+    features = encoder(image)
+    assert features.shape == (2, *shape)
+    if stride is None:
+        expected = avg_pool2d(2 * image - 1, 32).repeat(1, 32, 1, 1)
+        torch.testing.assert_close(features, expected)
+
+
+def test_weights_of_timm_come_with_their_normalisation_and_are_not_fetched_twice(timm):
+    image = torch.rand(1, 3, 64, 64)
+    settings = TIMM | {"pretrained": True}
+    for load_weights in (True, False):
+        encoder = TimmEncoder(stride=None, **settings | {"load_weights": load_weights})
+        mean, std = torch.tensor([[0.4, 0.5, 0.6], [0.1, 0.2, 0.3]])[:, :, None, None]
+        expected = avg_pool2d((image - mean) / std, 32).repeat(1, 32, 1, 1)
+        torch.testing.assert_close(encoder(image), expected)
+    assert timm.asked == [("pool", True, True), ("pool", False, True)]
+
+
+def test_backbones_that_do_not_fit_are_refused(timm):
+    with pytest.raises(
+        UserError, match=r"backbone=poool: timm cannot make it \(Unknown model \(poool\)\); choose"
+    ):
+        TimmEncoder(stride=4, **TIMM | {"backbone": "poool"})
+    timm.backbone = Backbone([16, 16, 16])
+    with pytest.raises(UserError, match=r"backbone=pool: has maps at strides \[16, 16, 16\]; choose"):
+        TimmEncoder(stride=16, **TIMM)
+    timm.backbone = Backbone([4, 8, 16, 32])
+    with pytest.raises(UserError, match=r"timm's pool has features at strides \[4, 8, 16, 32\], got 2"):
+        TimmEncoder(stride=2, **TIMM)
+
+
+def test_without_timm_its_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "timm", None)
+    with pytest.raises(UserError, match=r"pip install 'stereo-occ\[timm\]'"):
+        TimmEncoder(stride=4, **TIMM)

@@ -101,7 +101,9 @@ def test_every_shipped_file_is_tested_and_every_name_is_shipped(kind):
 @pytest.mark.parametrize("name", ["mono", "pixel_stereo", "plane_sweep_stereo", *COST_VOLUMES])
 def test_every_combination_builds_and_every_parameter_learns(name, encoder):
     choice = [f"model={name}"] if name in MODELS else ["model=stereo", f"model/cost_volume={name}"]
-    scratch = [SCRATCH] if encoder == "resnet18" else []
+    if encoder == "timm":
+        pytest.importorskip("timm")
+    scratch = {"resnet18": [SCRATCH], "timm": ["model.encoder.pretrained=false"]}.get(encoder, [])
     model = leave_zero(build(*choice, f"model/encoder={encoder}", *scratch))
     points = torch.rand(3, 40, 3) - 0.5
     logits = model(random_views(3), points)
@@ -217,7 +219,7 @@ def changed(path, value):
         (
             "encoder.name",
             "resnet81",
-            "model.encoder: unknown 'resnet81'; known are dilated_resnet, resnet18, light; did you",
+            "model.encoder: unknown 'resnet81'; known are dilated_resnet, resnet18, light, timm; did you",
         ),
         ("cost_volume.name", "concatenate", "did you mean concat?"),
         ("decoder.name", "os.system", "model.decoder: unknown 'os.system'; known are onet"),
