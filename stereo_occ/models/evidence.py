@@ -29,7 +29,7 @@ class PairEvidence(nn.Module):
         UserError: if the groups do not divide the channels.
 
     Attributes:
-        out_channels: width + groups + channels + 2 flags, the share of views that see the point and whether both do.
+        out_channels: width + groups + channels + 2 flags: whether both views see the point, and the share that do.
     """
 
     def __init__(
@@ -54,15 +54,9 @@ class PairEvidence(nn.Module):
         views = samples_VBNC.unbind()
         left_BNC, right_BNC = views[0], views[-1]
         both_BN1 = (count_BN1 == 2).float()
-        pair_BNP = torch.cat(
-            [
-                groupwise_correlation(left_BNC, right_BNC, self.groups),
-                self.difference(left_BNC - right_BNC),
-                torch.ones_like(both_BN1),
-            ],
-            dim=-1,
-        )
-        return torch.cat([mean_BNE, pair_BNP * both_BN1, count_BN1 / 2], dim=-1)
+        correlation_BNG = groupwise_correlation(left_BNC, right_BNC, self.groups) * both_BN1
+        difference_BNC = self.difference(left_BNC - right_BNC) * both_BN1
+        return torch.cat([mean_BNE, correlation_BNG, difference_BNC, both_BN1, count_BN1 / 2], dim=-1)
 
 
 class GlobalCode(nn.Module):
