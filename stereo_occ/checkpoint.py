@@ -4,29 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from lightning.pytorch import Callback, LightningModule, Trainer
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.config import TrainConfig
 from stereo_occ.data.prepare import build_rig
 from stereo_occ.errors import UserError
 from stereo_occ.models.build import build_model
-from stereo_occ.task import OccupancyTask
-
-VERSION = 1
-KEY = "stereo_occ"
-
-
-class StoreConfig(Callback):
-    """Puts the resolved configuration, as plain values, into every checkpoint."""
-
-    def __init__(self, config: dict[str, Any]) -> None:
-        self.config = config
-
-    def on_save_checkpoint(
-        self, trainer: Trainer, pl_module: LightningModule, checkpoint: dict[str, Any]
-    ) -> None:
-        checkpoint[KEY] = {"version": VERSION, "config": self.config}
+from stereo_occ.task import KEY, VERSION, OccupancyTask
 
 
 def plain(cfg: DictConfig) -> dict[str, Any]:
@@ -45,9 +29,7 @@ def build_task(cfg: DictConfig, load_weights: bool = True) -> OccupancyTask:
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
     rig = build_rig(typed.rig, typed.data.image_side)
-    return OccupancyTask(
-        build_model(plain(cfg.model), rig, load_weights), typed.optimizer, typed.scheduler, typed.steps
-    )
+    return OccupancyTask(build_model(plain(cfg.model), rig, load_weights), typed, plain(cfg))
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

@@ -1,20 +1,29 @@
 """The Lightning module around any occupancy model."""
 
+from typing import Any
+
 import lightning
 import torch
 from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from stereo_occ.config import OptimizerConfig, SchedulerConfig
+from stereo_occ.config import TrainConfig
 from stereo_occ.data.batch import Batch
 from stereo_occ.metrics.scores import Scores
 from stereo_occ.models.base import OccupancyModel
 from stereo_occ.optimization import build_optimizer, build_schedule
 
+#: Where a checkpoint has the configuration, and the version of its form.
+KEY, VERSION = "stereo_occ", 1
+
 
 class OccupancyTask(lightning.LightningModule):
     """Binary cross entropy on sampled points; IoU on validation and test objects.
+
+    Args:
+        config: of the training.
+        record: the whole configuration as plain values; it goes into every checkpoint.
 
     Attributes:
         threshold: decision threshold on the probability, chosen at each validation, kept in checkpoints.
@@ -23,14 +32,11 @@ class OccupancyTask(lightning.LightningModule):
 
     threshold: Tensor
 
-    def __init__(
-        self, model: OccupancyModel, optimizer: OptimizerConfig, scheduler: SchedulerConfig, steps: int
-    ) -> None:
+    def __init__(self, model: OccupancyModel, config: TrainConfig, record: dict[str, Any]) -> None:
         super().__init__()
         self.model = model
-        self.optimizer_config = optimizer
-        self.scheduler_config = scheduler
-        self.steps = steps
+        self.config = config
+        self.record = record
         self.scores = Scores()
         self.register_buffer("threshold", torch.tensor(0.5))
 
@@ -75,6 +81,9 @@ class OccupancyTask(lightning.LightningModule):
         self._log_scores("test")
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
-        optimizer = build_optimizer(self.optimizer_config, self.model)
-        schedule = build_schedule(self.scheduler_config, optimizer, self.steps)
+        optimizer = build_optimizer(self.config.optimizer, self.model)
+        schedule = build_schedule(self.config.scheduler, optimizer, self.config.steps)
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
+
+    def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        checkpoint[KEY] = {"version": VERSION, "config": self.record}

@@ -8,7 +8,7 @@ from hydra.core.hydra_config import HydraConfig
 from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelCheckpoint, TQDMProgressBar
 from omegaconf import DictConfig, OmegaConf
 
-from stereo_occ.checkpoint import StoreConfig, build_task, plain
+from stereo_occ.checkpoint import build_task, plain
 from stereo_occ.checks import check_training
 from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
@@ -58,7 +58,6 @@ def build_callbacks(cfg: DictConfig, typed: TrainConfig, folder: Path) -> list[C
     """Checkpoints (best and latest), metrics file, pictures, progress bar."""
     validation = typed.validation
     callbacks: list[Callback] = [
-        StoreConfig(plain(cfg)),
         ModelCheckpoint(
             folder,
             filename="best",

@@ -15,7 +15,7 @@ train() { # name, overrides
 measure() { # name, subset name, overrides
     name=$1; where=$2; shift 2
     states=$(ls "outputs/laptop_4k/$name"/step_*.ckpt | paste -sd,)
-    .venv/bin/python -m stereo_occ.evaluate -m checkpoint="$states" views=4 points=10000 examples=0 trainer.threads=1 \
+    .venv/bin/python -m stereo_occ.evaluate -m checkpoint="$states" views=4 points=5000 examples=0 trainer.threads=1 \
         hydra.sweep.dir="outputs/laptop_4k/$name/$where" progress=false "$@"
     .venv/bin/python -m stereo_occ.evaluate checkpoint="outputs/laptop_4k/$name/best.ckpt" views=16 points=20000 \
         examples=3 trainer.threads=1 hydra.run.dir="outputs/laptop_4k/$name/${where}_best" progress=false "$@"
