@@ -154,7 +154,7 @@ class Shard:
     @cached_property
     def _file(self) -> h5py.File:
         try:
-            file = h5py.File(self.path, "r")
+            file = h5py.File(self.path, "r", rdcc_nbytes=0)
             form, version = _text(file.attrs.get("format")), file.attrs.get("version")
         except (OSError, RuntimeError) as error:
             raise self._damaged(error) from error
