@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import hydra
-from hydra import compose, initialize_config_dir
 from hydra._internal.utils import get_args_parser
 from omegaconf import DictConfig
 
@@ -68,11 +67,16 @@ def entry_point(
 
 def compose_config(config_name: str, overrides: Sequence[str] = ()) -> DictConfig:
     """The configuration that a command line would give, with :class:`UserError` listing all problems."""
-    problems = find_problems(config_name, overrides, lambda cfg: [])
+    composed: list[DictConfig] = []
+
+    def keep(cfg: DictConfig) -> list[str]:
+        composed.append(cfg)
+        return []
+
+    problems = find_problems(config_name, overrides, keep, multirun=False)
     if problems:
         raise UserError("; ".join(problems))
-    with initialize_config_dir(str(conf_dir()), version_base="1.3"):
-        return compose(config_name, list(overrides))
+    return composed[0]
 
 
 def _report(problems: Sequence[str]) -> None:

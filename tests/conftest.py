@@ -76,3 +76,8 @@ def small_shard(
     path = folder / category / f"{object_id}.h5"
     write_shard(path, shape, views_of(views, **kwargs), pools_of(shape))
     return path
+
+
+def single_line(message: str) -> bool:
+    """Whether a message is one line of readable length."""
+    return "\n" not in message and len(message) < 300

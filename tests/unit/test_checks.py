@@ -1,0 +1,161 @@
+"""What a well-typed configuration can still get wrong: each problem names the key, its value and a way out."""
+
+import pytest
+import torch
+import yaml
+from conftest import single_line
+from omegaconf import OmegaConf
+
+from stereo_occ.checks import check_evaluation, check_pairs, check_training
+from stereo_occ.cli import compose_config
+from stereo_occ.problems import find_problems
+
+
+@pytest.fixture(scope="module")
+def valid():
+    return compose_config("train")
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        ("steps=0", "steps=0: must be at least 1"),
+        ("steps=-1", "steps=-1: must be at least 1"),
+        ("seed=-1", "seed=-1: must be at least 0"),
+        ("data.seed=-1", "data.seed=-1: must be at least 0"),
+        ("batch_size=0", "batch_size=0: must be at least 1"),
+        ("workers=-1", "workers=-1: must be at least 0"),
+        ("optimizer.lr=0", "optimizer.lr=0.0: must be above 0"),
+        ("optimizer.name=sgd", "optimizer.name=sgd: unknown; known: adam, adamw"),
+        ("optimizer.betas=[0.9]", "optimizer.betas=[0.9]: must be two numbers in [0, 1)"),
+        ("scheduler.name=cosin", "scheduler.name=cosin: unknown; did you mean cosine?"),
+        ("scheduler.final=2", "scheduler.final=2.0: must be a share"),
+        ("categories.names=[mgu]", "categories.names=mgu: unknown; did you mean mug?"),
+        ("categories.names=[]", "categories.names=[]: names no category"),
+        ("+data.counts.cup=3", "data.counts.cup: unknown category; known: bottle, bowl, mug"),
+        ("data.counts.mug=0", "data.counts.mug=0: must be at least 1; or leave mug out"),
+        ("data.counts.mug=2", "data.counts.mug: 2 are too few to divide"),
+        ("data.fractions=[0.5,0.5]", "data.fractions=[0.5, 0.5]: must be three shares"),
+        ("data.fractions=[0.7,0.1,0.1]", "data.fractions=[0.7, 0.1, 0.1]: must be three shares"),
+        ("data.fractions=[1,0,0]", "data.fractions=[1.0, 0.0, 0.0]: training needs"),
+        ("data.split=view data.views=2 validation.views=1", "data.views: 2 are too few to divide"),
+        (
+            "data.split=view data.views=20",
+            "validation.views=4: data.split=view leaves fewer of data.views=20",
+        ),
+        (
+            "data.image_side=50",
+            "data.image_side: model.encoder=dilated_resnet takes multiples of 16 pixels, got 50",
+        ),
+        ("data.views=3", "validation.views=4: there are only data.views=3"),
+        ("points=200000", "points=200000: there are only data.pool_size=100000"),
+        ("validation.points=200000", "validation.points=200000: there are only data.pool_size=100000"),
+        ("validation.interval=7", "steps=40000: is not a multiple of validation.interval=7"),
+        ("validation.checkpoint_interval=0", "validation.checkpoint_interval=0: must be at least 1"),
+        ("placement.diagonal=[0.5]", "placement.diagonal=[0.5]: must be [low, high]"),
+        ("placement.diagonal=[0.9,0.5]", "placement.diagonal=[0.9, 0.5]: must be [low, high]"),
+        ("placement.diagonal=[0.5,2]", "placement.diagonal=[0.5, 2.0]: must be [low, high]"),
+        ("rig.fov_deg=180", "rig.fov_deg=180.0: must be above 0 and below 180"),
+        ("rig.half_angle_deg=-3", "rig.half_angle_deg=-3.0: must be above 0 and below 90"),
+        ("rig.distance=0", "rig.distance=0.0: must be above 0"),
+        ("lights.count=[2,9]", "lights.count: must be [low, high]"),
+        ("material.hue=[0,2]", "material.hue: must be [low, high]"),
+        ("background.low=[0,0]", "background.low=[0.0, 0.0]: must be three values"),
+        ("queries.box=2", "queries=[2.0, 0.0, 0.0]: box, outside and surface must be shares"),
+        ("trainer.precision=16", "trainer.precision=16: unknown; known: 16-mixed, 32-true, bf16-mixed"),
+        ("trainer.accelerator=cup", "trainer.accelerator=cup: unknown; did you mean cpu"),
+        ("trainer.devices=2", "trainer.devices=2: a run uses one device"),
+        ("trainer.threads=0", "trainer.threads=0: must be at least 1"),
+        ("trainer.gradient_clip=-1", "trainer.gradient_clip=-1.0: must be above 0"),
+        ("logger.mesh_resolution=0", "logger.mesh_resolution=0: must be at least 1"),
+        ("model.encoder.name=foo", "model.encoder: unknown 'foo'"),
+        ("model.decoder.hidden=0", "model.decoder.hidden: must be at least 1, got 0"),
+    ],
+)
+def test_a_problem_of_a_training(valid, overrides, expected):
+    cfg = valid.copy()
+    for override in overrides.split():
+        key, _, value = override.partition("=")
+        OmegaConf.update(cfg, key.lstrip("+"), yaml.safe_load(value), force_add=key.startswith("+"))
+    (problem,) = check_training(cfg)
+    assert problem.startswith(expected)
+    assert single_line(problem)
+
+
+def test_parts_that_do_not_fit_each_other():
+    overrides = ["model/cost_volume=groupwise", "model.cost_volume.groups=7"]
+    (problem,) = find_problems("train", overrides, check_training)
+    assert problem == "model.cost_volume.groups: must divide the encoder's 16 channels, got 7"
+
+
+def test_a_gpu_that_is_not_there(monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    (problem,) = find_problems("train", ["trainer=gpu"], check_training)
+    assert problem == "trainer.accelerator=gpu: PyTorch sees no GPU here; say trainer=cpu"
+
+
+@pytest.mark.parametrize("steps", [5, 12, 45, 12345])
+def test_the_advice_on_the_schedule_helps(steps):
+    """Half of it would not: another number of steps moves the interval that is derived from it."""
+    found = find_problems("train", [f"steps={steps}"], check_training)
+    for problem in found:
+        advice = problem.rpartition("; say ")[2].split()
+        assert find_problems("train", advice, check_training) == []
+    assert bool(found) == (steps > 12)
+
+
+def test_every_problem_is_reported_at_once():
+    overrides = ["steps=0", "optimizer.lr=-1", "categories.names=[cup]", "rig.fov_deg=0", "batch_size=0"]
+    found = find_problems("train", overrides, check_training)
+    assert [problem.partition("=")[0] for problem in found] == [
+        "categories.names",
+        "rig.fov_deg",
+        "steps",
+        "batch_size",
+        "optimizer.lr",
+    ]
+
+
+def test_a_mesh_folder_must_exist(tmp_path):
+    overrides = ["data=meshes", f"data.root={tmp_path / 'nowhere'}"]
+    for program, check in (("train", check_training), ("render", check_pairs)):
+        (problem,) = find_problems(program, overrides, check)
+        assert problem.startswith(f"data.root={tmp_path / 'nowhere'}: no such folder")
+    assert find_problems("render", ["data=meshes", f"data.root={tmp_path}"], check_pairs) == []
+
+
+def test_rendering_needs_no_division_into_subsets():
+    assert (
+        find_problems("render", ["categories=mug", "scale.counts.mug=1", "data.views=1"], check_pairs) == []
+    )
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("subset=tset", "subset=tset: unknown; did you mean test"),
+        ("views=0", "views=0: must be at least 1"),
+        ("points=0", "points=0: must be at least 1"),
+        ("mesh_resolution=0", "mesh_resolution=0: must be at least 1"),
+        ("examples=-1", "examples=-1: must be at least 0"),
+        ("checkpoint=nowhere.ckpt", "checkpoint=nowhere.ckpt: no such file; give the path of a .ckpt"),
+    ],
+)
+def test_a_problem_of_an_evaluation(tmp_path, override, expected):
+    (tmp_path / "best.ckpt").touch()
+    overrides = [f"checkpoint={tmp_path / 'best.ckpt'}", override]
+    (problem,) = find_problems("evaluate", overrides, check_evaluation)
+    assert problem.startswith(expected)
+    assert single_line(problem)
+
+
+def test_an_evaluation_takes_sizes_from_its_checkpoint(tmp_path):
+    """Groups that refer to the scale compose without one: the checkpoint brings it."""
+    (tmp_path / "best.ckpt").touch()
+    overrides = [
+        f"checkpoint={tmp_path / 'best.ckpt'}",
+        "data=meshes",
+        f"data.root={tmp_path}",
+        "placement=free",
+    ]
+    assert find_problems("evaluate", overrides, check_evaluation) == []

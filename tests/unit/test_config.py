@@ -1,0 +1,179 @@
+"""Every file in ``conf/`` composes, passes the checks, and says what it is meant to."""
+
+from itertools import product
+from pathlib import Path
+
+import pytest
+import torch
+import yaml
+from omegaconf import OmegaConf
+
+from stereo_occ.checkpoint import plain
+from stereo_occ.checks import check_evaluation, check_pairs, check_training
+from stereo_occ.cli import compose_config
+from stereo_occ.config import training_config
+from stereo_occ.errors import UserError
+from stereo_occ.paths import conf_dir
+from stereo_occ.problems import find_problems
+from stereo_occ.shapes.procedural import PAPER_COUNTS
+
+PROGRAMS = ("train", "render", "evaluate")
+FILES = sorted(path.relative_to(conf_dir()).with_suffix("") for path in conf_dir().rglob("*.yaml"))
+CHOICES = [(str(file.parent), file.name) for file in FILES if file.parent != Path()]
+MODELS = [option for group, option in CHOICES if group == "model"]
+SCALES = [option for group, option in CHOICES if group == "scale"]
+
+
+def defaults_of(file):
+    return yaml.safe_load((conf_dir() / f"{file}.yaml").read_text()).get("defaults", [])
+
+
+def groups_of(program):
+    """The groups that a program's file and the files it includes let one choose."""
+    groups = set()
+    for entry in defaults_of(program):
+        if isinstance(entry, dict):
+            groups |= {name for name in entry if not name.startswith("override")}
+        elif entry != "_self_" and not entry.startswith("base_"):
+            groups |= groups_of(entry)
+    return groups
+
+
+def parts_of(model):
+    return {
+        f"model/{name}"
+        for entry in defaults_of(f"model/{model}")
+        if isinstance(entry, dict)
+        for name in entry
+    }
+
+
+@pytest.fixture
+def needed(tmp_path, monkeypatch):
+    """What a choice needs beside itself, and a machine with a GPU."""
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    (tmp_path / "best.ckpt").touch()
+    return {
+        "data=meshes": [f"data.root={tmp_path}"],
+        "evaluate": [f"checkpoint={tmp_path / 'best.ckpt'}"],
+    }
+
+
+def problems(program, overrides):
+    check = {"train": check_training, "render": check_pairs, "evaluate": check_evaluation}[program]
+    return find_problems(program, overrides, check)
+
+
+def test_every_group_of_conf_belongs_to_a_program():
+    reachable = set().union(*(groups_of(program) for program in PROGRAMS), *(parts_of(m) for m in MODELS))
+    assert {group for group, _ in CHOICES} == reachable
+
+
+def rows(program):
+    """Command lines that together name every choice of a program, one of each group at a time."""
+    options = {group: [option for g, option in CHOICES if g == group] for group in sorted(groups_of(program))}
+    return [
+        [f"{group}={choices[row]}" for group, choices in options.items() if row < len(choices)]
+        for row in range(max(map(len, options.values())))
+    ]
+
+
+@pytest.mark.parametrize(("program", "choices"), [(p, row) for p in PROGRAMS for row in rows(p)])
+def test_every_choice_of_every_program(needed, program, choices):
+    more = [override for choice in choices for override in needed.get(choice, [])]
+    assert problems(program, [*choices, *more, *needed.get(program, [])]) == []
+
+
+@pytest.mark.parametrize(
+    ("group", "option"), [(group, option) for group, option in CHOICES if group.startswith("model/")]
+)
+def test_every_part_composes_with_every_model_that_has_it_and_fits_one(group, option):
+    owners = [model for model in MODELS if group in parts_of(model)]
+    found = [problems("train", [f"model={model}", f"{group}={option}"]) for model in owners]
+    found = [
+        [problem for problem in job if "is not installed" not in problem] for job in found
+    ]  # optional packages
+    assert [] in found
+    assert not any("unknown" in problem for job in found for problem in job)
+
+
+@pytest.mark.parametrize(("model", "scale"), list(product(MODELS, SCALES)))
+def test_every_model_at_every_scale(model, scale):
+    assert problems("train", [f"model={model}", f"scale={scale}"]) == []
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("schedule", ["paper", "frequent"])
+def test_validation_schedules_end_with_the_last_step(scale, schedule):
+    cfg = compose_config("train", [f"scale={scale}", f"validation={schedule}", "scheduler=cosine"])
+    assert cfg.steps % cfg.validation.interval == 0
+    assert 1 <= cfg.scheduler.warmup < cfg.steps
+
+
+@pytest.mark.parametrize(
+    "file", [f for f in FILES if f.parent.parts[:1] not in {(), ("experiment",), ("debug",)}]
+)
+def test_every_group_file_is_checked_against_its_schema(file):
+    assert defaults_of(file)[0].startswith("base_")
+    assert defaults_of(file)[-1] == "_self_"
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_nothing_is_left_open(scale):
+    assert OmegaConf.missing_keys(compose_config("train", [f"scale={scale}"])) == set()
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_configuration_survives_a_checkpoint(model):
+    cfg = compose_config("train", [f"model={model}", "placement=free", "logger.tensorboard=false"])
+    values = plain(cfg)
+    assert values["placement"]["kind"] == "free"
+    restored = training_config(values)
+    assert plain(restored) == values
+    typed = OmegaConf.to_object(restored)
+    assert (typed.placement, typed.data) == (
+        OmegaConf.to_object(cfg.placement),
+        OmegaConf.to_object(cfg.data),
+    )
+
+
+def test_a_checkpoint_of_another_version_is_refused():
+    values = plain(compose_config("train"))
+    for broken in (
+        values | {"colour": "red"},
+        values | {"data": {"name": "pointclouds"}},
+        values | {"steps": "many"},
+        values | {"data": values["data"] | {"viws": 3}},
+    ):
+        with pytest.raises(UserError, match="written by another version"):
+            training_config(broken)
+
+
+def test_the_papers_numbers():
+    cfg = compose_config("train", ["scale=paper"])
+    assert (cfg.steps, cfg.validation.interval) == (40_000, 4_000)
+    assert cfg.data.counts == PAPER_COUNTS
+    assert (cfg.data.views, cfg.data.image_side) == (1000, 224)
+    assert list(cfg.data.fractions) == [0.8, 0.1, 0.1]
+    assert (cfg.rig.distance, cfg.rig.half_angle_deg) == (1.0, 180 / 16)
+    assert list(cfg.categories.names) == ["mug", "bowl", "bottle"]
+    assert plain(cfg)["placement"] == {"kind": "paper", "diagonal": [1.0, 1.0]}
+    assert (cfg.queries.box, cfg.queries.outside, cfg.queries.surface) == (1, 0, 0)
+
+
+def test_laptop_keeps_the_papers_objects_and_schedule():
+    cfg = compose_config("train", ["scale=laptop"])
+    assert (cfg.steps, cfg.validation.interval) == (40_000, 4_000)
+    assert cfg.data.counts == PAPER_COUNTS
+
+
+@pytest.mark.parametrize(("steps", "interval", "saves"), [(40_000, 4000, 1000), (20, 2, 1), (3, 1, 1)])
+def test_schedules_follow_the_steps_and_are_never_zero(steps, interval, saves):
+    cfg = compose_config("train", [f"steps={steps}"])
+    assert (cfg.validation.interval, cfg.validation.checkpoint_interval) == (interval, saves)
+
+
+def test_experiments_change_no_more_than_they_say():
+    plain_run, overfit = compose_config("train"), compose_config("train", ["experiment=overfit"])
+    changed = {key for key in plain(plain_run) if plain(plain_run)[key] != plain(overfit)[key]}
+    assert changed == {"scale", "data", "validation"}
