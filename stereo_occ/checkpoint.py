@@ -40,10 +40,12 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     """
     try:
         checkpoint = torch.load(path, map_location="cpu", weights_only=True)
-    except Exception as error:
-        reason = next(iter(str(error).splitlines()), type(error).__name__)
+    except OSError as error:
+        raise UserError(f"checkpoint={path}: cannot be read ({error.strerror or error})") from error
+    except Exception as error:  # torch's own message advises to execute what the file holds
         raise UserError(
-            f"checkpoint={path}: cannot be read ({reason}); give the best.ckpt or last.ckpt of a training run"
+            f"checkpoint={path}: is damaged, or holds more than tensors and plain values; "
+            f"give the best.ckpt or last.ckpt of a training run"
         ) from error
     ours = checkpoint.get(KEY) if isinstance(checkpoint, dict) else None
     if not isinstance(ours, dict):

@@ -18,6 +18,17 @@ from stereo_occ.render.gl import process_renderer
 from stereo_occ.shapes.shape import Shape
 
 SIDE = 16  # pixels
+
+#: A run of seconds with every part switched on. Six training views make two data epochs of its 12 steps of 4 pairs
+#: and more, and no epoch ends with a step.
+TINY = [
+    "steps=12", "batch_size=4", "points=64", "progress=false", "workers=1",
+    "data.image_side=32", "data.views=2", "data.pool_size=2000", "scale.counts={mug:3,bowl:3,bottle:3}",
+    "validation.interval=6", "validation.checkpoint_interval=3", "validation.views=2", "validation.points=500",
+    "model.width=8", "model.code_size=16", "model.encoder.widths=[8,8,8]", "model.encoder.blocks=[1,1,1]",
+    "model.decoder.hidden=16", "model.decoder.blocks=1", "optimizer.lr=0.01",
+    "logger.interval=1", "logger.mesh_resolution=8",
+]  # fmt: skip
 POOL = 2000  # points
 
 
