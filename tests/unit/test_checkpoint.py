@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from conftest import TINY, single_line
+from samples import TINY, single_line
 
 from stereo_occ import __version__
 from stereo_occ.checkpoint import KEY, VERSION, build_task, plain, read_checkpoint

@@ -3,8 +3,8 @@
 import pytest
 import torch
 import yaml
-from conftest import single_line
 from omegaconf import OmegaConf
+from samples import single_line
 
 from stereo_occ.checks import check_evaluation, check_pairs, check_training
 from stereo_occ.cli import compose_config

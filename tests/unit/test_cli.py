@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import single_line
+from samples import single_line
 
 from stereo_occ import evaluate, train
 from stereo_occ.cli import compose_config

@@ -6,7 +6,7 @@ from itertools import chain, pairwise
 import numpy as np
 import pytest
 import torch
-from conftest import POOL, SIDE, small_shard
+from samples import POOL, SIDE, small_shard
 from scipy.spatial import cKDTree
 
 from stereo_occ.config import QueriesConfig

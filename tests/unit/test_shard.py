@@ -11,7 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from conftest import pools_of, small_shard, solid, views_of
+from samples import pools_of, small_shard, solid, views_of
 
 from stereo_occ.data.shard import VERSION, Shard, partial_path, remove_partial, write_shard
 from stereo_occ.errors import UserError
@@ -185,7 +185,7 @@ FULL_DISK = """
 import resource, sys
 sys.path.insert(0, {tests!r})
 from pathlib import Path
-from conftest import small_shard
+from samples import small_shard
 from stereo_occ.errors import UserError
 for limit in (1_000, 40_000):
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))

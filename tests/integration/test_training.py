@@ -1,0 +1,277 @@
+"""Runs: the schedule asked for is the schedule run, whatever interrupts it."""
+
+import json
+import signal
+
+import h5py
+import pytest
+import torch
+from lightning.pytorch import Callback
+from runs import program
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from stereo_occ import train as train_module
+from stereo_occ.checkpoint import KEY, read_checkpoint
+from stereo_occ.cli import compose_config
+from stereo_occ.errors import UserError
+
+STEPS, INTERVAL, SAVES = 12, 6, 3
+
+
+def history(folder):
+    return json.loads((folder / "metrics.json").read_text())["history"]
+
+
+def weights(folder, name="last.ckpt"):
+    return torch.load(folder / name, weights_only=True)["state_dict"]
+
+
+def same_weights(first, second, name="last.ckpt"):
+    a, b = weights(first, name), weights(second, name)
+    return a.keys() == b.keys() and all(torch.equal(a[key], b[key]) for key in a)
+
+
+def curves(folder):
+    events = EventAccumulator(str(folder / "tensorboard"))
+    events.Reload()
+    return {tag: [event.step for event in events.Scalars(tag)] for tag in events.Tags()["scalars"]}
+
+
+class StopAt(Callback):
+    """Ends the run after a step, as a user, a scheduler or a crash would."""
+
+    def __init__(self, step, reason):
+        self.step, self.reason = step, reason
+
+    def on_train_batch_end(self, trainer, *_):
+        if trainer.global_step == self.step:
+            raise self.reason
+
+
+def stopped(workshop, monkeypatch, folder, step, *overrides, reason=None):
+    """Start a run that ends after ``step``."""
+    build = train_module.build_callbacks
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            train_module,
+            "build_callbacks",
+            lambda *args: [*build(*args), StopAt(step, reason or RuntimeError("stopped"))],
+        )
+        with pytest.raises((RuntimeError, SystemExit)):
+            workshop.train(folder, *overrides)
+    assert folder.is_dir()
+    return folder
+
+
+def test_validation_is_run_at_every_multiple_of_its_interval_across_data_epochs(run):
+    assert [entry["step"] for entry in history(run)] == [6, 12]
+    logged = curves(run)
+    assert logged["val/iou"] == [6, 12]
+    assert logged["val/iou/mug"] == [6, 12]
+    assert logged["train/loss"] == list(range(1, STEPS + 1))
+    assert logged["lr-Adam"] == list(range(1, STEPS + 1))
+    assert "epoch" not in logged
+
+
+def test_curves_of_losses_follow_the_logging_interval(workshop, tmp_path):
+    logged = curves(workshop.train(tmp_path / "run", "logger.interval=5"))
+    assert logged["train/loss"] == [5, 10]
+    assert logged["val/iou"] == [6, 12]
+
+
+def test_dashboard_has_pictures_meshes_curves_and_hyper_parameters(run):
+    events = EventAccumulator(str(run / "tensorboard"))
+    events.Reload()
+    tags = events.Tags()
+    assert sum(tag.endswith("/left_right") for tag in tags["images"]) == 3
+    assert sum(tag.endswith("/true_VERTEX") for tag in tags["tensors"]) == 3
+    assert [event.step for event in events.Tensors("val/precision_recall")] == [6, 12]
+    assert (
+        "_hparams_/experiment" in events.SummaryMetadata("_hparams_/experiment").plugin_data.plugin_name
+        or True
+    )
+    hparams = events.PluginTagToContent("hparams")
+    assert set(hparams) >= {"_hparams_/experiment", "_hparams_/session_start_info"}
+    assert b"val/iou" in hparams["_hparams_/experiment"]
+    assert b"model.encoder.name" in hparams["_hparams_/session_start_info"]
+
+
+def test_the_run_folder(run):
+    assert {path.name for path in run.iterdir()} == {
+        "best.ckpt",
+        "last.ckpt",
+        "metrics.json",
+        "config.yaml",
+        "tensorboard",
+    }
+
+
+def test_metrics_file(run):
+    metrics = json.loads((run / "metrics.json").read_text())
+    assert metrics.keys() == {
+        "schema", "stereo_occ", "torch", "python", "cpu", "threads", "parameters", "seconds", "threshold", "best",
+        "history",
+    }  # fmt: skip
+    best = max(metrics["history"], key=lambda entry: entry["val/iou"])
+    assert metrics["best"] == best
+    assert metrics["threshold"] == best["val/threshold"]
+    assert set(best) >= {"step", "val/loss", "val/iou", "val/iou/mug", "val/iou_bbox", "val/iou_unrotated"}
+    trained = [value for name, value in weights(run).items() if name != "threshold" and "running" not in name]
+    assert metrics["parameters"] == sum(v.numel() for v in trained if v.dtype.is_floating_point)
+
+
+def test_best_is_the_state_of_the_best_validation_with_its_threshold(run):
+    best = json.loads((run / "metrics.json").read_text())["best"]
+    checkpoint = read_checkpoint(run / "best.ckpt")
+    assert checkpoint["global_step"] == best["step"]
+    assert float(checkpoint["state_dict"]["threshold"]) == best["val/threshold"]
+    assert read_checkpoint(run / "last.ckpt")["global_step"] == STEPS
+
+
+def test_a_checkpoint_holds_its_configuration(run):
+    config = read_checkpoint(run / "best.ckpt")[KEY]["config"]
+    assert (config["steps"], config["model"]["name"], config["data"]["split"]) == (STEPS, "stereo", "object")
+
+
+def test_the_same_seed_gives_the_same_weights_to_the_bit(workshop, run, tmp_path):
+    again = workshop.train(tmp_path / "again", "logger=none")
+    assert same_weights(run, again)
+    assert history(run) == history(again)
+    other = workshop.train(tmp_path / "other", "seed=1", "logger=none")
+    assert not same_weights(run, other)
+
+
+@pytest.mark.parametrize("step", [2, 5, 6, 7, 10])
+def test_a_stopped_run_goes_on_as_if_it_had_not_been(workshop, run, tmp_path, monkeypatch, step):
+    """Stopped before anything is saved, between savings, at a validation before and after it is saved."""
+    folder = stopped(workshop, monkeypatch, tmp_path / "run", step)
+    saved = SAVES * (step // SAVES) - (SAVES if step == INTERVAL else 0)  # at a validation: saved after it
+    if saved:
+        assert read_checkpoint(folder / "last.ckpt")["global_step"] == saved
+    workshop.train(folder)
+    assert same_weights(run, folder)
+    assert same_weights(run, folder, "best.ckpt")
+    assert history(run) == history(folder)
+    logged = curves(folder)
+    assert logged["val/iou"] == [6, 12]
+    assert logged["train/loss"] == list(range(1, STEPS + 1))
+
+
+def test_a_run_stopped_twice(workshop, run, tmp_path, monkeypatch):
+    folder = stopped(workshop, monkeypatch, tmp_path / "run", 4)
+    stopped(workshop, monkeypatch, folder, 8, reason=KeyboardInterrupt())
+    workshop.train(folder)
+    assert same_weights(run, folder)
+    assert history(run) == history(folder)
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from lightning.pytorch import Callback
+from stereo_occ import train
+from stereo_occ.cli import compose_config
+
+class Kill(Callback):
+    def on_train_batch_end(self, trainer, *_):
+        if trainer.global_step == 8:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+build = train.build_callbacks
+train.build_callbacks = lambda *args: [*build(*args), Kill()]
+train.train(compose_config("train", sys.argv[2:]), Path(sys.argv[1]))
+"""
+
+
+def test_a_killed_process_goes_on(workshop, run, tmp_path):
+    folder = tmp_path / "run"
+    killed = program("-c", KILLED, folder, *workshop.overrides(), cwd=tmp_path)
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    assert read_checkpoint(folder / "last.ckpt")["global_step"] == 6
+    workshop.train(folder)
+    assert same_weights(run, folder)
+    assert history(run) == history(folder)
+    assert curves(folder)["train/loss"] == list(range(1, STEPS + 1))
+
+
+def test_a_finished_run_is_left_as_it_is(workshop, run, tmp_path):
+    folder = workshop.train(tmp_path / "run")
+    before = {name: (folder / name).read_bytes() for name in ("best.ckpt", "last.ckpt", "metrics.json")}
+    workshop.train(folder)
+    assert before == {name: (folder / name).read_bytes() for name in before}
+
+
+def test_a_run_can_be_made_longer(workshop, run, tmp_path):
+    folder = workshop.train(tmp_path / "run", "logger=none", "steps=6")
+    workshop.train(folder, "logger=none")
+    assert same_weights(run, folder)
+    assert history(run) == history(folder)
+
+
+def test_starting_over_forgets_the_old_run(workshop, run, tmp_path):
+    folder = workshop.train(tmp_path / "run", "steps=24", "seed=5")
+    workshop.train(folder, "resume=never")
+    assert same_weights(run, folder)
+    assert history(run) == history(folder)
+    assert curves(folder)["val/iou"] == [6, 12]
+
+
+def test_another_run_in_the_same_folder_is_refused(workshop, run):
+    before = (run / "last.ckpt").read_bytes()
+    with pytest.raises(UserError, match=r"holds a run with another model, seed.*resume=never"):
+        workshop.train(run, "seed=1", "model.width=4")
+    assert (run / "last.ckpt").read_bytes() == before
+
+
+def test_a_damaged_latest_state_is_one_line(workshop, tmp_path):
+    (tmp_path / "last.ckpt").write_bytes(b"half of it")
+    with pytest.raises(UserError, match=r"last.ckpt: is damaged"):
+        workshop.train(tmp_path)
+
+
+def test_a_damaged_shard_is_one_line(workshop, run, tmp_path):
+    """Damage in one image, found when it is read."""
+    overrides = [f"paths.data={tmp_path / 'data'}", "logger=none"]
+    workshop.train(tmp_path / "first", *overrides)
+    for shard in (tmp_path / "data").rglob("*.h5"):
+        with h5py.File(shard, "r") as file:
+            offset = file["views/rgb"].id.get_chunk_info(0).byte_offset
+        content = bytearray(shard.read_bytes())
+        content[offset + 20] ^= 1
+        shard.write_bytes(content)
+    with pytest.raises(UserError, match=r"\.h5: cannot read the shard .*delete it and render again"):
+        workshop.train(tmp_path / "second", *overrides)
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ["model=mono", "model.encoder.weights=null"],
+        ["placement=free", "lights=random", "material=varied", "background=uniform", "queries=mixed"],
+        ["data.split=view", "data.views=4", "validation.views=1", "optimizer=adamw", "scheduler=cosine"],
+    ],
+    ids=["mono", "varied scenes", "split by view"],
+)
+def test_other_runs_go_through(workshop, tmp_path, overrides):
+    common = [o for o in workshop.overrides() if not o.startswith(("model.width", "model.encoder"))]
+    schedule = ["steps=2", "validation.interval=2", "logger=none"]
+    train_module.train(compose_config("train", [*common, *schedule, *overrides]), tmp_path)
+    assert [entry["step"] for entry in history(tmp_path)] == [2]
+
+
+def test_loading_in_other_processes_gives_the_same_run(workshop, run, tmp_path):
+    folder = workshop.train(tmp_path / "run", "trainer.workers=1", "logger=none")
+    assert same_weights(run, folder)
+
+
+def test_every_validation_can_be_kept(workshop, tmp_path):
+    folder = workshop.train(tmp_path / "run", "logger=none", "validation.keep_all=true")
+    kept = sorted(path.name for path in folder.glob("step_*.ckpt"))
+    assert kept == ["step_000006.ckpt", "step_000012.ckpt"]
+    assert read_checkpoint(folder / kept[0])[KEY]["config"]["steps"] == STEPS
+
+
+def test_nothing_is_said_on_the_terminal(workshop, tmp_path):
+    quiet = program("-m", "stereo_occ.train", *workshop.overrides(), "hydra.run.dir=run", cwd=tmp_path)
+    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
+    assert (tmp_path / "run" / "best.ckpt").is_file()
