@@ -42,4 +42,4 @@ def _logits(
     model: OccupancyModel, code: Any, points_N3: NDArray[np.floating], device: torch.device
 ) -> NDArray[np.float32]:
     points_BN3 = torch.as_tensor(points_N3, dtype=torch.float32, device=device)[None]
-    return model.decode(code, points_BN3)[0].float().cpu().numpy()
+    return model.decode_all(code, points_BN3)[0].float().cpu().numpy()

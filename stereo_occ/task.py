@@ -50,7 +50,9 @@ class OccupancyTask(lightning.LightningModule):
 
     def _evaluation_step(self, batch: Batch, stage: str) -> dict[str, Tensor]:
         code = self.model.encode(batch.views)
-        logits = {name: self.model.decode(code, q.points_BN3).float() for name, q in batch.queries.items()}
+        logits = {
+            name: self.model.decode_all(code, q.points_BN3).float() for name, q in batch.queries.items()
+        }
         self.scores.update(batch, logits)
         loss = binary_cross_entropy_with_logits(logits["bbox"], batch.queries["bbox"].occupied_BN)
         self.log(f"{stage}/loss", loss, batch_size=len(batch))

@@ -255,3 +255,11 @@ def test_weights_are_not_fetched_where_a_state_dict_follows(monkeypatch):
     fresh = build_model(model_config("model=mono"), rig(64), load_weights=False)
     scratch = build(*MONO)
     fresh.load_state_dict(scratch.state_dict())
+
+
+@pytest.mark.parametrize("count", [1, 4097, 10000])
+def test_points_answered_in_pieces_get_the_answer_they_get_at_once(count):
+    model = build("model=stereo").eval()
+    code, points_BN3 = torch.randn(2, 512), torch.rand(2, count, 3) - 0.5
+    with torch.inference_mode():
+        torch.testing.assert_close(model.decode_all(code, points_BN3), model.decode(code, points_BN3))
