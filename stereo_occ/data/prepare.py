@@ -21,6 +21,7 @@ from stereo_occ.config import PairsConfig, RigConfig
 from stereo_occ.data.objects import ObjectSource, list_objects
 from stereo_occ.data.placement import draw_pose
 from stereo_occ.data.shard import VERSION, Views, remove_partial, write_shard
+from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import StereoRig, toed_in_rig
 from stereo_occ.occupancy.pools import box_pool, surface_pool
 from stereo_occ.render.appearance import draw_appearance
@@ -175,5 +176,10 @@ def _plain(value: object) -> object:
 
 
 def _write_description(folder: Path, pairs: PairsConfig) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "dataset.json").write_text(json.dumps(_description(pairs), indent=2, sort_keys=True) + "\n")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "dataset.json").write_text(json.dumps(_description(pairs), indent=2, sort_keys=True) + "\n")
+    except OSError as error:
+        raise UserError(
+            f"paths.data={pairs.paths.data}: cannot be written ({error}); give another folder"
+        ) from error

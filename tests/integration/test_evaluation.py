@@ -1,0 +1,190 @@
+"""Evaluation: the same numbers as in training, other objects, and what cannot be evaluated."""
+
+import csv
+import json
+import shutil
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+from PIL import Image
+from runs import program
+from samples import single_line
+
+from stereo_occ.checkpoint import KEY, read_checkpoint
+from stereo_occ.cli import compose_config
+from stereo_occ.errors import UserError
+from stereo_occ.train import train
+
+
+def rows(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def evaluation(workshop, run, tmp_path_factory):
+    """The evaluation of the best checkpoint on the validation objects: its folder and metrics."""
+    folder = tmp_path_factory.mktemp("evaluation")
+    return folder, workshop.evaluate(run / "best.ckpt", folder, "subset=val")
+
+
+@pytest.fixture(scope="module")
+def meshes(tmp_path_factory):
+    """Two usable mugs, a usable bowl, an open bottle, and a folder that is no category."""
+    root = tmp_path_factory.mktemp("meshes")
+    for name, extents in (("mug/tall", (1, 2, 1)), ("mug/wide", (3, 1, 1)), ("bowl/flat", (2, 1, 2))):
+        (root / name).mkdir(parents=True)
+        trimesh.creation.box(extents=extents).export(root / name / "model.obj")
+    (root / "bottle" / "open").mkdir(parents=True)
+    opened = trimesh.creation.box()
+    opened.update_faces(np.arange(12) < 11)
+    opened.export(root / "bottle" / "open" / "model.obj")
+    (root / "vase" / "x").mkdir(parents=True)
+    return root
+
+
+def test_evaluating_repeats_the_validation_of_the_training(run, evaluation):
+    _, metrics = evaluation
+    best = json.loads((run / "metrics.json").read_text())["best"]
+    expected = {name.removeprefix("val/"): value for name, value in best.items() if name.startswith("val/")}
+    measured = {name.removeprefix("test/"): value for name, value in metrics.items()}
+    assert measured == pytest.approx(expected, abs=1e-6)
+
+
+def test_results_are_files(run, evaluation):
+    folder, metrics = evaluation
+    results = json.loads((folder / "metrics.json").read_text())
+    assert results["metrics"] == metrics
+    assert results["threshold"] == json.loads((run / "metrics.json").read_text())["threshold"]
+    assert (results["subset"], results["objects"], results["views"]) == ("val", 3, 2)
+    table = rows(folder / "per_object.csv")
+    assert [row["category"] for row in table] == ["bottle", "bowl", "mug"]
+    for row in table:
+        assert float(row["iou"]) == pytest.approx(metrics[f"test/iou/{row['category']}"], abs=1e-6)
+    assert not (folder / "skipped.csv").exists()
+
+
+def test_example_meshes_and_pictures(evaluation):
+    folder, _ = evaluation
+    truths = sorted(folder.glob("meshes/*/*_true.glb"))
+    assert [path.parent.name for path in truths] == ["bottle", "bowl", "mug"]
+    for path in truths:
+        mesh = trimesh.load_mesh(path)
+        assert mesh.is_volume
+        assert np.abs(mesh.bounds).max() <= 0.5 + 1e-6  # posed, in the rig frame
+    for path in folder.glob("pictures/*/*.png"):
+        with Image.open(path) as picture:
+            assert picture.size == (4 * 192, 192)
+    assert len(list(folder.glob("pictures/*/*.png"))) == 3
+
+
+def test_the_stored_threshold_decides(workshop, run, tmp_path):
+    """Another threshold in the checkpoint gives other numbers, and those of 0.5 stay."""
+    checkpoint = read_checkpoint(run / "best.ckpt")
+    results = {}
+    for threshold in (0.05, 0.5, 0.95):
+        checkpoint["state_dict"]["threshold"] = torch.tensor(threshold)
+        torch.save(checkpoint, tmp_path / "best.ckpt")
+        results[threshold] = workshop.evaluate(tmp_path / "best.ckpt", tmp_path / "out", "examples=0")
+    assert results[0.5]["test/iou"] == pytest.approx(results[0.5]["test/iou_at_0.5"])
+    assert results[0.05]["test/iou"] != results[0.95]["test/iou"]
+    assert len({metrics["test/iou_at_0.5"] for metrics in results.values()}) == 1
+
+
+def test_batches_do_not_change_the_result(workshop, run, tmp_path, evaluation):
+    one_by_one = workshop.evaluate(run / "best.ckpt", tmp_path, "subset=val", "batch_size=1", "examples=0")
+    assert one_by_one == pytest.approx(
+        evaluation[1], abs=2e-3
+    )  # a logit at the threshold may round either way
+
+
+def test_a_folder_of_meshes(workshop, run, meshes, tmp_path):
+    metrics = workshop.evaluate(
+        run / "best.ckpt", tmp_path, "data=meshes", f"data.root={meshes}", "data.pool_size=1000", "subset=all"
+    )
+    results = json.loads((tmp_path / "metrics.json").read_text())
+    assert (results["objects"], results["skipped"]) == (3, 2)
+    assert [row["object_id"] for row in rows(tmp_path / "per_object.csv")] == ["flat", "tall", "wide"]
+    reasons = {row["category"]: row["reason"] for row in rows(tmp_path / "skipped.csv")}
+    assert reasons["bottle"].startswith("not watertight")
+    assert "not a category" in reasons["vase"]
+    assert set(metrics) >= {"test/iou", "test/iou/mug", "test/iou/bowl"}
+    assert "test/iou/bottle" not in metrics
+    assert "meshes_32px" in results["data"]  # the checkpoint's image side, as many views as asked
+
+
+def test_other_objects_scenes_and_cameras(workshop, run, tmp_path):
+    overrides = ["data=procedural", "data.seed=7", "data.pool_size=1000", "categories=mug", "subset=all"]
+    scenes = ["placement=free", "lights=random", "material=varied", "background=uniform", "rig=paper"]
+    metrics = workshop.evaluate(
+        run / "best.ckpt", tmp_path, *overrides, *scenes, "rig.fov_deg=65", "examples=0", "views=1"
+    )
+    assert 0 <= metrics["test/iou/mug"] <= 1
+    assert len(rows(tmp_path / "per_object.csv")) == 3
+
+
+@pytest.mark.parametrize(
+    ("overrides", "complaint"),
+    [
+        (["views=3"], "views=3: there are only 2 of each object in test; ask for fewer"),
+        (["points=5000"], "5000 asked from a pool of 2000"),
+        (["rig=paper", "rig.fov_deg=190"], "rig.fov_deg=190.0: must be above 0 and below 180"),
+        (["data=meshes", "data.root=/nowhere"], "data.root=/nowhere: no such folder"),
+        (["categories=mug", "categories.names=[cup]"], "categories.names=cup: unknown"),
+    ],
+)
+def test_what_the_checkpoints_data_cannot_give(workshop, run, tmp_path, overrides, complaint):
+    with pytest.raises(UserError) as refusal:
+        workshop.evaluate(run / "best.ckpt", tmp_path, *overrides)
+    assert complaint in str(refusal.value)
+    assert single_line(str(refusal.value))
+
+
+def test_a_folder_without_a_solid(workshop, run, meshes, tmp_path):
+    shutil.copytree(meshes / "bottle", tmp_path / "only" / "bottle")
+    with pytest.raises(UserError, match=r"no watertight mesh of mug, bowl, bottle among 1 files"):
+        workshop.evaluate(
+            run / "best.ckpt", tmp_path, "data=meshes", f"data.root={tmp_path / 'only'}", "subset=all"
+        )
+
+
+def test_a_configuration_of_another_version(workshop, run, tmp_path):
+    checkpoint = read_checkpoint(run / "best.ckpt")
+    checkpoint[KEY]["config"]["colour"] = "red"
+    torch.save(checkpoint, tmp_path / "best.ckpt")
+    with pytest.raises(UserError, match="written by another version"):
+        workshop.evaluate(tmp_path / "best.ckpt", tmp_path / "out")
+
+
+def test_pretrained_weights_are_not_fetched_for_a_checkpoint(workshop, tmp_path):
+    """A model that began with ImageNet weights is evaluated where they are not to be had."""
+    mono = ["model=mono", "model.encoder.weights=null", "model.code_size=8", "model.decoder.hidden=8"]
+    common = [o for o in workshop.overrides() if not o.startswith("model.")]
+    train(
+        compose_config("train", [*common, *mono, "steps=1", "validation.interval=1", "logger=none"]),
+        tmp_path / "run",
+    )
+    checkpoint = read_checkpoint(tmp_path / "run" / "best.ckpt")
+    checkpoint[KEY]["config"]["model"]["encoder"]["weights"] = "IMAGENET1K_V1"
+    torch.save(checkpoint, tmp_path / "best.ckpt")
+    assert "test/iou" in workshop.evaluate(tmp_path / "best.ckpt", tmp_path / "out", "examples=0")
+
+
+def test_the_command(workshop, run, tmp_path):
+    (tmp_path / "bad.ckpt").write_bytes(b"half of it")
+    refused = program("-m", "stereo_occ.evaluate", "checkpoint=bad.ckpt", cwd=tmp_path)
+    assert refused.returncode == 2
+    (line,) = refused.stderr.splitlines()
+    assert line.startswith("stereo_occ: checkpoint=bad.ckpt: is damaged, or holds more")
+    arguments = [
+        f"checkpoint={run / 'best.ckpt'}",
+        f"paths.data={workshop.root / 'data'}",
+        "hydra.run.dir=out",
+    ]
+    settings = ["views=2", "points=500", "examples=0", "progress=false"]
+    done = program("-m", "stereo_occ.evaluate", *arguments, *settings, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "test/iou " in done.stdout + done.stderr
+    assert (tmp_path / "out" / "metrics.json").is_file()

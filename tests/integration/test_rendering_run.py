@@ -1,0 +1,136 @@
+"""Rendering a data set: the same bytes however it is done, and nothing twice."""
+
+import json
+import socket
+
+import numpy as np
+import pytest
+from omegaconf import OmegaConf
+from runs import program
+
+from stereo_occ.cli import compose_config
+from stereo_occ.data import prepare as prepare_module
+from stereo_occ.data.prepare import prepare
+from stereo_occ.data.shard import Shard, partial_path
+from stereo_occ.errors import UserError
+
+SMALL = [
+    "data.image_side=32", "data.views=2", "data.pool_size=500", "scale.counts={mug:2,bowl:1,bottle:1}",
+    "progress=false",
+]  # fmt: skip
+
+
+def render(folder, *overrides, workers=1):
+    cfg = compose_config("render", [*SMALL, f"paths.data={folder}", f"workers={workers}", *overrides])
+    return prepare(OmegaConf.to_object(cfg), progress=False)
+
+
+def contents(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*.h5")}
+
+
+def times(folder):
+    return {path: path.stat().st_mtime_ns for path in folder.rglob("*.h5")}
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rendered")
+    render(folder)
+    return folder
+
+
+def test_the_number_of_processes_changes_no_byte(rendered, tmp_path):
+    render(tmp_path, workers=2)
+    assert contents(tmp_path) == contents(rendered)
+    assert len(contents(rendered)) == 4
+
+
+def test_a_complete_data_set_is_left_alone(rendered, monkeypatch):
+    before = times(rendered)
+    monkeypatch.setattr(prepare_module, "render_object", lambda *_: pytest.fail("rendered again"))
+    assert len(render(rendered).paths) == 4
+    assert times(rendered) == before
+
+
+def test_an_interrupted_rendering_goes_on_where_it_stopped(rendered, tmp_path, monkeypatch):
+    render_object, done = prepare_module.render_object, []
+
+    def interrupted(*args):
+        if len(done) == 2:
+            raise KeyboardInterrupt
+        done.append(render_object(*args))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(prepare_module, "render_object", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            render(tmp_path)
+    first = times(tmp_path)
+    assert len(first) == 2
+    left_behind = partial_path(next(iter(first)), socket.gethostname(), 2**22 - 1)
+    left_behind.write_bytes(b"half a shard of a process that was killed")
+    render(tmp_path)
+    assert contents(tmp_path) == contents(rendered)
+    assert {path: time for path, time in times(tmp_path).items() if path in first} == first
+    assert not left_behind.exists()
+
+
+def test_objects_do_not_depend_on_which_others_there_are(rendered, tmp_path):
+    render(tmp_path, "categories=mug", "scale.counts.mug=1")
+    (path,) = contents(tmp_path)
+    assert contents(tmp_path)[path] == contents(rendered)[path]
+
+
+def test_whatever_changes_the_pictures_has_a_folder_of_its_own(rendered):
+    (used,) = rendered.iterdir()
+    names = {used.name}
+    changes = [
+        "data.seed=1", "data.views=3", "data.image_side=48", "data.pool_size=400", "placement=free",
+        "rig.fov_deg=50", "lights=random", "material=varied", "background=uniform",
+    ]  # fmt: skip
+    for change in changes:
+        cfg = compose_config("render", [*SMALL, f"paths.data={rendered}", change])
+        names.add(prepare_module._folder_name(OmegaConf.to_object(cfg)))
+    assert len(names) == len(changes) + 1
+    for change in ("data.split=view", "data.fractions=[0.6,0.2,0.2]", "categories=mug", "scale.counts.mug=9"):
+        cfg = compose_config("render", [*SMALL, f"paths.data={rendered}", change])
+        assert prepare_module._folder_name(OmegaConf.to_object(cfg)) == used.name
+
+
+def test_the_folder_says_what_it_holds(rendered):
+    (folder,) = rendered.iterdir()
+    description = json.loads((folder / "dataset.json").read_text())
+    assert description["data"]["image_side"] == 32
+    assert description["placement"]["kind"] == "paper"
+
+
+def test_shards_show_the_object_where_the_pose_says(rendered):
+    """The mask of each image covers the projected vertices, and depth lies within the object's reach."""
+    for path in rendered.rglob("*.h5"):
+        with Shard(path) as shard:
+            for view in range(len(shard)):
+                posed_N3 = shard.poses[view].to_rig(shard.mesh.vertices)
+                for side, mask, depth in zip((0, 1), shard.mask(view), shard.depth(view), strict=True):
+                    K, camera_from_rig = (array[view, side] for array in shard.cameras)
+                    camera_N3 = posed_N3 @ camera_from_rig[:3, :3].T + camera_from_rig[:3, 3]
+                    pixels_N2 = (camera_N3 @ K.T)[:, :2] / camera_N3[:, 2:]
+                    v, u = np.nonzero(mask > 0)
+                    assert np.abs(pixels_N2.min(axis=0) - [u.min(), v.min()]).max() <= 1
+                    assert np.abs(pixels_N2.max(axis=0) - [u.max(), v.max()]).max() <= 1
+                    seen = depth[depth > 0].astype(float)
+                    low, high = camera_N3[:, 2].min(), camera_N3[:, 2].max()
+                    assert low - 2e-3 <= seen.min() <= seen.max() <= high + 2e-3
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
+    (tmp_path / "data").write_text("a file where the folder should be")
+    with pytest.raises(UserError, match=r"paths.data=.*data: cannot be written"):
+        render(tmp_path / "data")
+
+
+def test_the_command(rendered, tmp_path):
+    arguments = ["-m", "stereo_occ.render", *SMALL, "paths.data=data", "workers=1"]
+    done = program(*arguments, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert contents(tmp_path / "data") == contents(rendered)
+    assert "4 objects in data/procedural_32px" in done.stdout + done.stderr
