@@ -22,7 +22,7 @@ from stereo_occ.data.prepare import build_rig
 from stereo_occ.errors import UserError
 from stereo_occ.metrics_file import environment, write_json
 from stereo_occ.pictures import comparison
-from stereo_occ.quiet import quiet_lightning
+from stereo_occ.quiet import quiet_libraries
 from stereo_occ.reconstruction import reconstruct
 from stereo_occ.task import KEY, OccupancyTask
 
@@ -37,7 +37,7 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     Returns:
         The metrics, with the keys of ``metrics.json``'s ``metrics``.
     """
-    quiet_lightning()
+    quiet_libraries()
     settings = own_settings(cfg)
     if settings.trainer.threads:
         torch.set_num_threads(settings.trainer.threads)

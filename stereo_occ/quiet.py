@@ -1,4 +1,4 @@
-"""Keeps off the terminal what Lightning says about itself and what does not apply here."""
+"""Keeps off the terminal what libraries say about themselves and what does not apply here."""
 
 import logging
 import warnings
@@ -16,8 +16,9 @@ BESIDE_THE_POINT = (
 )
 
 
-def quiet_lightning() -> None:
-    """Silence Lightning's notes on hardware, its advertisements, and the warnings listed above."""
-    logging.getLogger("lightning.pytorch").setLevel(logging.WARNING)
+def quiet_libraries() -> None:
+    """Silence notes on hardware and on how a mesh was read, advertisements, and the warnings listed above."""
+    for library in ("lightning.pytorch", "trimesh"):
+        logging.getLogger(library).setLevel(logging.WARNING)
     for beginning in BESIDE_THE_POINT:
         warnings.filterwarnings("ignore", beginning)

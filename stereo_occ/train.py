@@ -14,7 +14,7 @@ from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
 from stereo_occ.data.datamodule import PairsDataModule
 from stereo_occ.metrics_file import WriteMetrics
-from stereo_occ.quiet import quiet_lightning
+from stereo_occ.quiet import quiet_libraries
 from stereo_occ.resume import AtomicCheckpoints, SaveLatest, step_to_resume
 from stereo_occ.tensorboard import ShowInTensorBoard, StepLogger
 
@@ -23,7 +23,7 @@ def train(cfg: DictConfig, folder: Path) -> lightning.Trainer:
     """Train ``cfg`` in ``folder``, from its latest checkpoint if ``resume=auto`` and there is one."""
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
-    quiet_lightning()
+    quiet_libraries()
     if typed.trainer.threads:
         torch.set_num_threads(typed.trainer.threads)
     latest = folder / "last.ckpt"

@@ -8,6 +8,7 @@ from stereo_occ.checks import check_pairs
 from stereo_occ.cli import entry_point
 from stereo_occ.config import RenderConfig
 from stereo_occ.data.prepare import prepare
+from stereo_occ.quiet import quiet_libraries
 
 logger = logging.getLogger(__name__)
 
@@ -15,6 +16,7 @@ logger = logging.getLogger(__name__)
 @entry_point("render", check_pairs)
 def main(cfg: DictConfig) -> None:
     """Render what is missing and say where it is."""
+    quiet_libraries()
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, RenderConfig)
     prepared = prepare(typed, typed.progress)
