@@ -133,7 +133,9 @@ def _problems_one_by_one(config_name: str, overrides: list[str]) -> list[str]:
             node = known.get(_key(override))
             if node is None:
                 problems.append(f"{_key(override)}: {_unknown(_key(override), known)}")
-            elif expected := _expected(node, key):
+            elif key.startswith("+") and not key.startswith("++"):
+                problems.append(f"{override}: the key exists already; write {override[1:]}")
+            elif expected := _expected(node, key.lstrip("+")):
                 problems.append(f"{key}={value}: must be {expected}")
             else:
                 problems.append(f"{override}: {_one_line(error)}")

@@ -30,6 +30,7 @@ MISTAKES = [
     ("categories.names=mug", "categories.names=mug: must be a list such as [mug,bowl,bottle]"),
     ("model.encoder=3", "model.encoder=3: must be given key by key: model.encoder.name=..."),
     ("paths.data=null", "paths.data=null: must be text"),
+    ("+steps=3", "+steps=3: the key exists already; write steps=3"),
     ("stesp=3", "stesp: unknown key; did you mean steps?"),
     ("++stesp=3", "stesp: unknown key; did you mean steps?"),
     ("+stesp=3", "stesp: unknown key; did you mean steps?"),

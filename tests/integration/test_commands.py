@@ -1,0 +1,81 @@
+"""Every command in the README is one that works."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import torch
+
+import stereo_occ
+from stereo_occ.checks import check_evaluation, check_pairs, check_training
+from stereo_occ.problems import find_problems
+
+CHECKOUT = Path(stereo_occ.__file__).parents[1]
+CHECKS = {"train": check_training, "evaluate": check_evaluation, "render": check_pairs}
+
+
+def code_lines(text):
+    """The lines of the code blocks, continuations joined."""
+    blocks = re.findall(r"^```\w*\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+    return [line.strip() for block in blocks for line in block.replace("\\\n", " ").splitlines()]
+
+
+def commands():
+    lines = code_lines((CHECKOUT / "README.md").read_text())
+    return [line for line in lines if "python -m stereo_occ" in line]
+
+
+def make_targets():
+    lines = code_lines((CHECKOUT / "README.md").read_text())
+    return [words[1] for line in lines if (words := shlex.split(line, comments=True))[:1] == ["make"]]
+
+
+def test_the_readme_shows_the_commands():
+    shown = {shlex.split(line, comments=True)[2] for line in commands()}
+    assert shown >= {f"stereo_occ.{program}" for program in CHECKS}
+    assert any(" -m " in line.partition("stereo_occ")[2] for line in commands())
+
+
+@pytest.mark.parametrize("command", commands())
+def test_a_command_of_the_readme_composes_without_problems(command, tmp_path, monkeypatch):
+    """Files and folders that it names stand for the reader's own; a GPU is assumed."""
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    words = shlex.split(command, comments=True)
+    words = words[words.index("python") :]
+    assert words[:2] == ["python", "-m"]
+    package, program = words[2].split(".")
+    assert package == "stereo_occ"
+    assert program in CHECKS, f"no test knows {words[2]}"
+    (tmp_path / "x.ckpt").touch()
+    overrides = []
+    for word in words[3:]:
+        key = word.partition("=")[0]
+        stand_in = {"checkpoint": tmp_path / "x.ckpt", "data.root": tmp_path}.get(key)
+        overrides.append(f"{key}={stand_in}" if stand_in else word)
+    flags = [word for word in overrides if word.startswith("-")]
+    assert set(flags) <= {"-m", "--multirun"}
+    values = [word for word in overrides if not word.startswith("-")]
+    assert find_problems(program, values, CHECKS[program], multirun=bool(flags)) == []
+
+
+def test_the_make_targets_of_the_readme_exist():
+    makefile = (CHECKOUT / "Makefile").read_text()
+    assert make_targets()
+    for target in make_targets():
+        assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
+
+
+def test_the_commands_of_the_makefile_compose(tmp_path):
+    text = (CHECKOUT / "Makefile").read_text().replace("$(DEMO)", str(tmp_path))
+    lines = re.findall(r"-m (stereo_occ\.\S+) (.*)$", text, flags=re.MULTILINE)
+    assert {program for program, _ in lines} >= {"stereo_occ.train", "stereo_occ.evaluate"}
+    for module, arguments in lines:
+        program = module.split(".")[1]
+        overrides = [word for word in shlex.split(arguments) if "=" in word]
+        for word in overrides:
+            if word.startswith("checkpoint="):
+                path = Path(word.partition("=")[2])
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.touch()
+        assert find_problems(program, overrides, CHECKS[program]) == []
