@@ -99,7 +99,9 @@ def _writer(trainer: lightning.Trainer) -> SummaryWriter:
 
 
 def _add_mesh(writer: SummaryWriter, tag: str, mesh: Trimesh, step: int) -> None:
+    """Coloured by the direction of the surface, as normal maps are."""
     if len(mesh.faces):
-        vertices_1V3 = torch.from_numpy(np.asarray(mesh.vertices, dtype=np.float32))[None]
-        faces_1F3 = torch.from_numpy(np.asarray(mesh.faces, dtype=np.int32))[None]
-        writer.add_mesh(tag, vertices_1V3, faces=faces_1F3, global_step=step)
+        colors = (127.5 * (np.asarray(mesh.vertex_normals) + 1)).astype(np.uint8)
+        arrays = (mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32), colors)
+        vertices_1V3, faces_1F3, colors_1V3 = (torch.from_numpy(array)[None] for array in arrays)
+        writer.add_mesh(tag, vertices_1V3, colors=colors_1V3, faces=faces_1F3, global_step=step)
