@@ -12,8 +12,8 @@ HERE = Path(__file__).parent
 README = HERE.parent / "README.md"
 BEGIN, END = "<!-- results:begin -->", "<!-- results:end -->"
 RUNS = {
-    "stereo": "python -m stereo_occ.train model=stereo",
-    "mono": "python -m stereo_occ.train model=mono model.encoder.weights=null",
+    "stereo": "python -m stereo_occ.train model=stereo steps=4000",
+    "mono": "python -m stereo_occ.train model=mono model.encoder.weights=null steps=4000",
 }
 METRICS = {"iou": "-", "iou_bbox": "--", "iou_unrotated": ":"}
 FIGURE_CATEGORIES = ("mug", "bowl", "bottle")
