@@ -1,11 +1,13 @@
 """``python -m stereo_occ.train``: render what is missing, train, validate, write the run folder."""
 
+import sys
 from pathlib import Path
 
 import lightning
 import torch
 from hydra.core.hydra_config import HydraConfig
 from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelCheckpoint, TQDMProgressBar
+from lightning.pytorch.utilities.exceptions import SIGTERMException
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.checkpoint import build_task, plain
@@ -36,7 +38,16 @@ def train(cfg: DictConfig, folder: Path) -> lightning.Trainer:
     data = build_data(typed)
     data.prepare_data()
     trainer = build_trainer(typed, folder, build_callbacks(cfg, typed, folder), step)
-    trainer.fit(task, data, ckpt_path=latest if resume else None, weights_only=True)
+    try:
+        trainer.fit(task, data, ckpt_path=latest if resume else None, weights_only=True)
+    except (
+        SystemExit
+    ) as stop:  # how Lightning ends after Ctrl-C (code 1) or SIGTERM (code 0, as if it were done)
+        sys.stderr.write(
+            f"stereo_occ: stopped after step {trainer.global_step} of {typed.steps}; "
+            f"the same command with hydra.run.dir={folder} goes on\n"
+        )
+        raise SystemExit(143 if isinstance(stop, SIGTERMException) else 130) from stop
     return trainer
 
 

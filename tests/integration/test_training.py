@@ -7,6 +7,7 @@ import h5py
 import pytest
 import torch
 from lightning.pytorch import Callback
+from lightning.pytorch.utilities.exceptions import SIGTERMException
 from runs import program
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
@@ -50,15 +51,17 @@ class StopAt(Callback):
 
 def stopped(workshop, monkeypatch, folder, step, *overrides, reason=None):
     """Start a run that ends after ``step``."""
-    build = train_module.build_callbacks
+    build, on_interrupt = train_module.build_callbacks, signal.getsignal(signal.SIGINT)
     with monkeypatch.context() as patch:
         patch.setattr(
             train_module,
             "build_callbacks",
             lambda *args: [*build(*args), StopAt(step, reason or RuntimeError("stopped"))],
         )
-        with pytest.raises((RuntimeError, SystemExit)):
+        with pytest.raises((RuntimeError, SystemExit)) as stop:
             workshop.train(folder, *overrides)
+    signal.signal(signal.SIGINT, on_interrupt)  # Lightning ignores it from then on
+    assert reason is None or stop.value.code in (130, 143)
     assert folder.is_dir()
     return folder
 
@@ -157,9 +160,14 @@ def test_a_stopped_run_goes_on_as_if_it_had_not_been(workshop, run, tmp_path, mo
     assert logged["train/loss"] == list(range(1, STEPS + 1))
 
 
-def test_a_run_stopped_twice(workshop, run, tmp_path, monkeypatch):
-    folder = stopped(workshop, monkeypatch, tmp_path / "run", 4)
-    stopped(workshop, monkeypatch, folder, 8, reason=KeyboardInterrupt())
+def test_a_run_stopped_by_hand_and_by_the_machine(workshop, run, tmp_path, monkeypatch, capsys):
+    """Ctrl-C and SIGTERM end with the exit codes of their signals and say how to go on."""
+    folder = tmp_path / "run"
+    for step, reason in ((4, KeyboardInterrupt()), (8, SIGTERMException())):
+        stopped(workshop, monkeypatch, folder, step, reason=reason)
+        assert capsys.readouterr().err == (
+            f"stereo_occ: stopped after step {step} of 12; the same command with hydra.run.dir={folder} goes on\n"
+        )
     workshop.train(folder)
     assert same_weights(run, folder)
     assert history(run) == history(folder)
@@ -169,6 +177,7 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 from lightning.pytorch import Callback
+from lightning.pytorch.utilities.exceptions import SIGTERMException
 from stereo_occ import train
 from stereo_occ.cli import compose_config
 
