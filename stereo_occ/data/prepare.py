@@ -7,6 +7,7 @@ import os
 import threading
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from enum import Enum
 from functools import cache
@@ -132,6 +133,11 @@ def _render_all(tasks: list[tuple[ObjectSource, Path]], pairs: PairsConfig, work
         try:
             for job in as_completed(jobs):
                 yield job.result()
+        except BrokenProcessPool as error:
+            raise UserError(
+                f"workers={workers}: a rendering process was killed, perhaps for want of memory; ask for fewer; "
+                f"what is finished is kept"
+            ) from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

@@ -1,6 +1,8 @@
 """Rendering a data set: the same bytes however it is done, and nothing twice."""
 
 import json
+import os
+import signal
 import socket
 
 import numpy as np
@@ -120,6 +122,18 @@ def test_shards_show_the_object_where_the_pose_says(rendered):
                     seen = depth[depth > 0].astype(float)
                     low, high = camera_N3[:, 2].min(), camera_N3[:, 2].max()
                     assert low - 2e-3 <= seen.min() <= seen.max() <= high + 2e-3
+
+
+def test_a_killed_rendering_process_is_one_line(tmp_path, monkeypatch):
+    """A renderer that dies as if the system had killed it, with a second one at work."""
+    monkeypatch.setattr(prepare_module, "render_object", die)
+    with pytest.raises(UserError, match=r"workers=2: a rendering process was killed"):
+        render(tmp_path, workers=2)
+    assert contents(tmp_path) == {}
+
+
+def die(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
