@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from zlib import crc32
 
 from stereo_occ.config import DataConfig, MeshesConfig, ProceduralConfig
 from stereo_occ.errors import UserError
@@ -14,11 +15,21 @@ from stereo_occ.shapes.shape import Shape
 
 @dataclass(frozen=True)
 class ObjectSource:
-    """One object of a data set and how to build it (picklable, so that any process can)."""
+    """One object of a data set and how to build it (picklable, so that any process can).
+
+    Attributes:
+        version: differs when a file of the same name holds another mesh.
+    """
 
     category: str
     object_id: str
     build: Callable[[], Shape]
+    version: str = ""
+
+    @property
+    def file_name(self) -> str:
+        """Of its shard."""
+        return f"{self.object_id}{self.version}.h5"
 
 
 def list_objects(data: DataConfig, categories: list[str]) -> tuple[list[ObjectSource], list[Skipped]]:
@@ -38,7 +49,7 @@ def list_objects(data: DataConfig, categories: list[str]) -> tuple[list[ObjectSo
     assert isinstance(data, MeshesConfig)
     shapes, skipped = read_folder(Path(data.root))
     sources = [
-        ObjectSource(shape.category, shape.object_id, partial(_built, shape))
+        ObjectSource(shape.category, shape.object_id, partial(_built, shape), _version(shape))
         for shape in shapes
         if shape.category in categories
     ]
@@ -52,3 +63,7 @@ def list_objects(data: DataConfig, categories: list[str]) -> tuple[list[ObjectSo
 
 def _built(shape: Shape) -> Shape:
     return shape
+
+
+def _version(shape: Shape) -> str:
+    return f"_{crc32(shape.mesh.vertices.tobytes() + shape.mesh.faces.tobytes()):08x}"

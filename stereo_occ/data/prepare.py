@@ -59,7 +59,7 @@ def prepare(pairs: PairsConfig, progress: bool) -> PreparedShards:
     """
     sources, skipped = list_objects(pairs.data, pairs.categories.names)
     folder = Path(pairs.paths.data) / _folder_name(pairs)
-    paths = [folder / source.category / f"{source.object_id}.h5" for source in sources]
+    paths = [folder / source.category / source.file_name for source in sources]
     missing = [(source, path) for source, path in zip(sources, paths, strict=True) if not path.exists()]
     if missing:
         remove_partial(folder)

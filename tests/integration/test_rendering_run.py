@@ -7,6 +7,7 @@ import socket
 
 import numpy as np
 import pytest
+import trimesh
 from omegaconf import OmegaConf
 from runs import program
 
@@ -122,6 +123,25 @@ def test_shards_show_the_object_where_the_pose_says(rendered):
                     seen = depth[depth > 0].astype(float)
                     low, high = camera_N3[:, 2].min(), camera_N3[:, 2].max()
                     assert low - 2e-3 <= seen.min() <= seen.max() <= high + 2e-3
+
+
+def test_a_mesh_that_changed_is_rendered_again(tmp_path):
+    """Its file has the same name; the shard of the old one must not be taken for it."""
+    model = tmp_path / "meshes" / "mug" / "mine" / "model.obj"
+    model.parent.mkdir(parents=True)
+    overrides = ["data=meshes", f"data.root={tmp_path / 'meshes'}", "data.image_side=32", "data.views=1"]
+    ratios = []
+    for extents in ((1, 2, 1), (1, 2, 1), (1, 5, 1)):
+        trimesh.creation.box(extents=extents).export(model)
+        cfg = compose_config(
+            "render", [*overrides, "data.pool_size=100", f"paths.data={tmp_path}", "workers=1"]
+        )
+        (path,) = prepare(OmegaConf.to_object(cfg), progress=False).paths
+        with Shard(path) as shard:
+            assert (shard.category, shard.object_id) == ("mug", "mine")
+            ratios.append(shard.mesh.extents.max() / shard.mesh.extents.min())
+    assert ratios == pytest.approx([2, 2, 5])
+    assert len(contents(tmp_path)) == 2
 
 
 def test_a_killed_rendering_process_is_one_line(tmp_path, monkeypatch):
