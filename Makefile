@@ -22,7 +22,7 @@ $(READY): requirements.lock pyproject.toml
 	@touch $@
 
 demo: $(READY) ## render a small data set, train, evaluate, write meshes and pictures (minutes)
-	@$(RUN)/python -m stereo_occ.train scale=smoke hydra.run.dir=$(DEMO)/train resume=never
+	@$(RUN)/python -m stereo_occ.train scale=smoke queries=mixed hydra.run.dir=$(DEMO)/train resume=never
 	@$(RUN)/python -m stereo_occ.evaluate checkpoint=$(DEMO)/train/best.ckpt points=20000 views=4 hydra.run.dir=$(DEMO)/evaluation
 	@echo
 	@echo "pictures (left | right | predicted | true): $(DEMO)/evaluation/pictures"

@@ -21,6 +21,18 @@ from stereo_occ.reconstruction import reconstruct
 from stereo_occ.task import OccupancyTask
 
 CURVE_POINTS = 512  # per view
+HPARAM_GROUPS = (
+    "model",
+    "optimizer",
+    "scheduler",
+    "queries",
+    "rig",
+    "placement",
+    "seed",
+    "steps",
+    "batch_size",
+    "points",
+)
 HPARAM_METRICS = ("val/iou", "val/iou_bbox", "val/iou_unrotated", "val/loss")
 
 
@@ -76,7 +88,8 @@ class ShowInTensorBoard(Callback):
     def on_fit_end(self, trainer: lightning.Trainer, pl_module: LightningModule) -> None:
         # The table reads the values from the curves; torch's add_hparams would write them again, as step 0.
         metrics = dict.fromkeys(HPARAM_METRICS, 0.0)
-        for summary in hparams(flatten(self.hyper_parameters), metrics):  # type: ignore[no-untyped-call]
+        chosen = {group: self.hyper_parameters[group] for group in HPARAM_GROUPS}
+        for summary in hparams(flatten(chosen), metrics):  # type: ignore[no-untyped-call]
             _writer(trainer)._get_file_writer().add_summary(summary)  # type: ignore[no-untyped-call]
 
 
