@@ -58,7 +58,7 @@ def examples(folder: Path, name: str) -> None:
     """The first test object of each category: left | right | predicted | true."""
     rows = []
     for category in FIGURE_CATEGORIES:
-        first = sorted((folder / name / "pictures" / "test" / category).glob("*.png"))[0]
+        first = sorted((folder / name / "pictures" / category).glob("*.png"))[0]
         rows.append(np.asarray(Image.open(first)))
     Image.fromarray(np.concatenate(rows)).save(folder / "figure.png", optimize=True)
 

@@ -17,13 +17,10 @@ def main(run: Path, destination: Path) -> None:
         if best.is_dir():
             shutil.copy(best / "metrics.json", destination / f"{where}.json")
             shutil.copy(best / "per_object.csv", destination / f"{where}_per_object.csv")
-            for picture in sorted((best / "pictures").glob("*/*.png")):
-                copy = destination / "pictures" / where / picture.parent.name / picture.name
-                copy.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy(picture, copy)
         for path in (run / where).glob("*/metrics.json"):
             measured = json.loads(path.read_text())
             curve.setdefault(measured["step"], {})[where] = measured["metrics"]
+    shutil.copytree(run / "test_best" / "pictures", destination / "pictures", dirs_exist_ok=True)
     steps = [{"step": step, **curve[step]} for step in sorted(curve)]
     (destination / "curve.json").write_text(json.dumps(steps, indent=1) + "\n")
 
