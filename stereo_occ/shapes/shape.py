@@ -5,9 +5,13 @@ from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from trimesh import Trimesh
 
 CATEGORIES = ("mug", "bowl", "bottle")
+
+#: What is known about an object; plain values that JSON can hold.
+Fact = str | float | bool | list[list[float]]
 
 #: Part labels of query points, in the order of their codes in a shard; 0 is a point outside the object.
 PARTS = ("outside", "wall", "floor", "neck", "handle")
@@ -24,13 +28,15 @@ class Shape:
         parts: solids that delimit the named parts, in the object frame; an occupied point belongs to the
             first one that contains it, else to the wall. Empty where the parts are not known.
         facts: plain figures about the object (kind, wall thickness, ...) for reports.
+        colors: of the vertices ``(V, 3)``, sRGB; None where the object has no colours of its own.
     """
 
     category: str
     object_id: str
     mesh: Trimesh
     parts: Mapping[str, Trimesh] = field(default_factory=dict)
-    facts: Mapping[str, str | float | bool] = field(default_factory=dict)
+    facts: Mapping[str, Fact] = field(default_factory=dict)
+    colors: NDArray[np.uint8] | None = None
 
     def normalized(self) -> Self:
         """The same object moved and scaled into the object frame."""
@@ -44,4 +50,5 @@ class Shape:
             self.mesh.copy().apply_transform(to_object),
             {name: part.copy().apply_transform(to_object) for name, part in self.parts.items()},
             self.facts,
+            self.colors,
         )
