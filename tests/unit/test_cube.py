@@ -92,7 +92,7 @@ def test_the_cube_holds_the_object_and_is_not_much_larger():
     directions_N3 = rng.standard_normal((500, 3))
     directions_N3 /= np.linalg.norm(directions_N3, axis=1, keepdims=True)
     for _ in range(50):
-        half_3 = rng.uniform(0.03, 0.08, 3)
+        half_3 = rng.uniform(0.05, 0.08, 3)
         points_N3 = rng.uniform([-0.1, -0.1, 0.4], [0.1, 0.1, 1.4]) + half_3 * directions_N3
         cube = working_cube(rig, boxes_of(rig, points_N3), 64)
         assert np.abs(transform_points(points_N3, cube.cube_from_source)).max() < 0.5
