@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from omegaconf import MISSING
 
-from stereo_occ.errors import UserError
+from stereo_occ.ranges import bounds, draw
 
 #: The shader's limit on directional lights.
 MAX_LIGHTS = 4
@@ -90,22 +90,22 @@ def draw_appearance(
     Raises:
         UserError: for a range that is not ``[low, high]`` within its bounds, or too few or too many lights.
     """
-    fewest, most = _bounds(lights.count, "lights.count", 0, min(len(lights.sources), MAX_LIGHTS))
+    fewest, most = bounds(lights.count, "lights.count", 0, min(len(lights.sources), MAX_LIGHTS))
     count = int(rng.integers(int(fewest), int(most), endpoint=True))
-    ambient = _draw(lights.ambient, "lights.ambient", rng, 0, np.inf)
+    ambient = draw(lights.ambient, "lights.ambient", rng, 0, np.inf)
     sources = [
         _draw_source(lights.sources[name], f"lights.sources.{name}", lights.warmth, rng)
         for name in list(lights.sources)[:count]
     ]
-    hsv = [_draw(getattr(material, name), f"material.{name}", rng) for name in ("hue", "saturation", "value")]
+    hsv = [draw(getattr(material, name), f"material.{name}", rng) for name in ("hue", "saturation", "value")]
     base_color_3 = np.array(hsv_to_rgb(*hsv))
     return Appearance(
         light_from_L3=np.array([direction_3 for direction_3, _ in sources]).reshape(-1, 3),
         light_color_L3=np.array([color_3 for _, color_3 in sources]).reshape(-1, 3),
         ambient=ambient,
         base_color_3=base_color_3,
-        metallic=_draw(material.metallic, "material.metallic", rng),
-        roughness=_draw(material.roughness, "material.roughness", rng),
+        metallic=draw(material.metallic, "material.metallic", rng),
+        roughness=draw(material.roughness, "material.roughness", rng),
         background_3=_draw_background(background, base_color_3, rng),
     )
 
@@ -113,10 +113,10 @@ def draw_appearance(
 def _draw_source(
     source: LightSourceConfig, name: str, warmth: Sequence[float], rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    azimuth = np.radians(_draw(source.azimuth_deg, f"{name}.azimuth_deg", rng, -360, 360))
-    elevation = np.radians(_draw(source.elevation_deg, f"{name}.elevation_deg", rng, -90, 90))
-    intensity = _draw(source.intensity, f"{name}.intensity", rng, 0, np.inf)
-    tint = _draw(warmth, "lights.warmth", rng, -1, 1)
+    azimuth = np.radians(draw(source.azimuth_deg, f"{name}.azimuth_deg", rng, -360, 360))
+    elevation = np.radians(draw(source.elevation_deg, f"{name}.elevation_deg", rng, -90, 90))
+    intensity = draw(source.intensity, f"{name}.intensity", rng, 0, np.inf)
+    tint = draw(warmth, "lights.warmth", rng, -1, 1)
     level = np.cos(elevation)
     direction_3 = np.array([level * np.sin(azimuth), np.sin(elevation), level * np.cos(azimuth)])
     return direction_3, intensity * np.array([1 + tint, 1, 1 - tint])
@@ -126,24 +126,10 @@ def _draw_background(
     background: BackgroundConfig, base_color_3: NDArray[np.float64], rng: np.random.Generator, tries: int = 32
 ) -> NDArray[np.uint8]:
     """The first of ``tries`` colours that is far enough from the object's, else the farthest."""
-    ranges = [_bounds(pair, "background", 0, 1) for pair in zip(background.low, background.high, strict=True)]
+    ranges = [bounds(pair, "background", 0, 1) for pair in zip(background.low, background.high, strict=True)]
     low_3, high_3 = np.array(ranges).T
     colors_T3 = rng.uniform(low_3, high_3, (tries, 3))
     distance_T = np.linalg.norm(colors_T3 - base_color_3 ** (1 / GAMMA), axis=1)
     far_T = distance_T >= background.contrast
     color_3: NDArray[np.float64] = colors_T3[np.argmax(far_T if far_T.any() else distance_T)]
     return np.rint(255 * color_3).astype(np.uint8)
-
-
-def _draw(
-    limits: Sequence[float], name: str, rng: np.random.Generator, least: float = 0, most: float = 1
-) -> float:
-    return float(rng.uniform(*_bounds(limits, name, least, most)))
-
-
-def _bounds(limits: Sequence[float], name: str, least: float, most: float) -> tuple[float, float]:
-    if len(limits) != 2 or not least <= limits[0] <= limits[1] <= most:
-        raise UserError(
-            f"{name}: must be [low, high] with {least:g} <= low <= high <= {most:g}, got {list(limits)}"
-        )
-    return limits[0], limits[1]
