@@ -4,7 +4,6 @@ import hashlib
 import json
 import multiprocessing
 import os
-import threading
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -21,6 +20,7 @@ from tqdm import tqdm
 from stereo_occ.config import PairsConfig, RigConfig
 from stereo_occ.data.objects import ObjectSource, list_objects
 from stereo_occ.data.placement import draw_pose
+from stereo_occ.data.processes import start_worker
 from stereo_occ.data.shard import VERSION, Views, remove_partial, write_shard
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import StereoRig, toed_in_rig
@@ -128,7 +128,7 @@ def _render_all(tasks: list[tuple[ObjectSource, Path]], pairs: PairsConfig, work
         return
     # Spawned, not forked: a forked process inherits a GL state that hangs it.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=start_worker) as pool:
         jobs = [pool.submit(render_object, source, path, pairs) for source, path in tasks]
         try:
             for job in as_completed(jobs):
@@ -141,19 +141,6 @@ def _render_all(tasks: list[tuple[ObjectSource, Path]], pairs: PairsConfig, work
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def _start_worker() -> None:
-    """One thread for the software rasteriser and for NumPy, since processes share the cores; end with the parent."""
-    os.environ |= {"LP_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
 
 
 def _folder_name(pairs: PairsConfig) -> str:
