@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from stereo_occ.errors import UserError
+from stereo_occ.render.drawing import renderer_class
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
 
@@ -61,7 +62,7 @@ def process_renderer(width: int, height: int) -> Any:
         pyrender = import_pyrender()
         try:
             offscreen = pyrender.OffscreenRenderer(width, height)
-            offscreen._renderer = _single_sampled(pyrender.renderer)(width, height)
+            offscreen._renderer = renderer_class(pyrender.renderer)(width, height)
         except Exception as error:
             raise _no_gl(error) from error
         _renderer, _owner = offscreen, os.getpid()
@@ -71,25 +72,6 @@ def process_renderer(width: int, height: int) -> Any:
         )
     _renderer.viewport_width, _renderer.viewport_height = width, height
     return _renderer
-
-
-def _single_sampled(module: Any) -> Any:
-    """pyrender's renderer without multisampling, which takes most of the time on a software rasteriser."""
-
-    class SingleSampled(module.Renderer):  # type: ignore[misc]
-        def _configure_main_framebuffer(self) -> None:
-            former_size = self._main_fb_dims
-            super()._configure_main_framebuffer()
-            if self._main_fb_dims == former_size:
-                return
-            for buffer, content in (
-                (self._main_cb_ms, module.GL_RGBA),
-                (self._main_db_ms, module.GL_DEPTH_COMPONENT24),
-            ):
-                module.glBindRenderbuffer(module.GL_RENDERBUFFER, buffer)
-                module.glRenderbufferStorage(module.GL_RENDERBUFFER, content, *self._main_fb_dims)
-
-    return SingleSampled
 
 
 def _no_gl(error: Exception) -> UserError:
