@@ -1,0 +1,118 @@
+"""All meshes of a data set, read and repaired in processes of their own, so that none can stop the others."""
+
+import multiprocessing
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, as_completed
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pebble import ProcessExpired, ProcessPool
+from tqdm import tqdm
+
+from stereo_occ.data.processes import start_worker
+from stereo_occ.errors import UserError
+from stereo_occ.shapes.inspection import Inspection
+from stereo_occ.shapes.layouts import MeshFile
+from stereo_occ.shapes.mesh_cache import DAMAGED, MeshCache, load
+from stereo_occ.shapes.shape import Shape
+
+
+@dataclass(frozen=True, eq=False)
+class MeshRecord:
+    """A file of a data set and what became of it.
+
+    Attributes:
+        outcome: without mesh and colours, which :meth:`load` reads.
+        entry: in the cache; None if inspecting the file failed.
+    """
+
+    file: MeshFile
+    outcome: Inspection
+    entry: Path | None
+
+    def load(self) -> Inspection:
+        """The outcome with mesh and colours.
+
+        Raises:
+            UserError: the cache is damaged.
+        """
+        if self.entry is None:
+            return self.outcome
+        try:
+            return load(self.entry)
+        except DAMAGED as error:
+            raise UserError(f"{self.entry}: cannot be read ({error}); delete it and try again") from error
+
+    def shape(self) -> Shape:
+        """The object, if the file was not rejected."""
+        return self.load().shape(self.file)
+
+
+def inspect_files(
+    files: Sequence[MeshFile], cache: MeshCache, workers: int, time_limit: float, progress: bool
+) -> list[MeshRecord]:
+    """Inspect files that are not in the cache, each for at most ``time_limit`` seconds; a record for each file.
+
+    A file whose process hangs, crashes or is killed is rejected with that reason, and tried again the next time.
+
+    Args:
+        workers: processes; 0: one per core.
+
+    Raises:
+        UserError: the cache cannot be written.
+    """
+    entries = {file.path: cache.find(file.path) for file in files}
+    missing = [path for path, entry in entries.items() if entry is None]
+    failures: dict[Path, str] = {}
+    if missing:
+        count = min(len(missing), workers or os.cpu_count() or 1)
+        # Spawned: a process forked from one with threads or OpenGL may hang.
+        context = multiprocessing.get_context("spawn")
+        with (
+            tqdm(total=len(missing), desc="reading meshes", unit="mesh", disable=not progress) as bar,
+            ProcessPool(count, initializer=start_worker, context=context) as pool,
+        ):
+            jobs: dict[Future[Path], Path] = {
+                pool.schedule(cache.make, args=(path,), timeout=time_limit): path for path in missing
+            }
+            try:
+                for job in as_completed(jobs):
+                    entries[jobs[job]], failures[jobs[job]] = _result(job, time_limit)
+                    bar.update()
+            except BaseException:
+                pool.stop()
+                raise
+    return [_record(file, entries[file.path], failures.get(file.path, "")) for file in files]
+
+
+def without_copies(records: Sequence[MeshRecord]) -> Iterator[MeshRecord]:
+    """The records, those rejected that hold the same solid as one before them: a copy must not be in two subsets."""
+    first: dict[str, MeshFile] = {}
+    for record in records:
+        original = first.setdefault(record.outcome.checksum or str(record.file.path), record.file)
+        if original is record.file or record.outcome.reason:
+            yield record
+        else:
+            reason = f"is a copy of {original.category}/{original.object_id}"
+            yield replace(record, outcome=replace(record.outcome, reason=reason))
+
+
+def _record(file: MeshFile, entry: Path | None, failure: str) -> MeshRecord:
+    if entry is None:
+        return MeshRecord(file, Inspection(None, reason=failure), None)
+    return MeshRecord(file, load(entry, header_only=True), entry)
+
+
+def _result(job: Future[Path], time_limit: float) -> tuple[Path | None, str]:
+    """The entry of a finished job, or why there is none."""
+    try:
+        return job.result(), ""
+    except UserError:
+        raise
+    except TimeoutError:
+        return None, f"took longer than data.time_limit={time_limit:g} seconds"
+    except ProcessExpired as error:
+        return None, f"the process that read it ended with code {error.exitcode}, perhaps for want of memory"
+    except Exception as error:  # whatever a mesh does to the libraries, the others are to be read
+        return None, f"failed: {type(error).__name__}: {' '.join(str(error).split())[:200]}"

@@ -1,0 +1,98 @@
+"""A mesh file made into a solid, or the reason why it is none."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+from trimesh import Trimesh
+
+from stereo_occ.errors import UserError
+from stereo_occ.shapes.layouts import MeshFile
+from stereo_occ.shapes.reading import read_mesh
+from stereo_occ.shapes.repair import repair
+from stereo_occ.shapes.shape import Fact, Shape
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """What became of a mesh file.
+
+    Attributes:
+        mesh: a solid in the file's own frame; of a rejected file what was found in it, None if it cannot be read.
+        colors: of the vertices of a solid ``(V, 3)``, sRGB; None where the file has none or they are not wanted.
+        steps: of the repair, in order.
+        measures: figures of the repair by name.
+        reason: why the file was rejected, in one line; empty if it was not.
+        checksum: eight characters that change with mesh and colours; empty if the file cannot be read.
+        side_files: SHA-256 of the other files it refers to, see :class:`~stereo_occ.shapes.reading.RawMesh`.
+    """
+
+    mesh: Trimesh | None
+    colors: NDArray[np.uint8] | None = None
+    steps: tuple[str, ...] = ()
+    measures: Mapping[str, float] = field(default_factory=dict)
+    reason: str = ""
+    checksum: str = ""
+    side_files: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def status(self) -> str:
+        """``clean``, ``repaired`` or ``rejected``."""
+        return "rejected" if self.reason else "repaired" if self.steps else "clean"
+
+    def shape(self, file: MeshFile) -> Shape:
+        """The object, its facts among them the 4x4 matrix ``file_from_object`` back to the file's own frame."""
+        assert self.mesh is not None
+        assert not self.reason
+        facts: dict[str, Fact] = {
+            "file": file.path.name,
+            "status": self.status,
+            "repair": "; ".join(self.steps),
+            "faces": len(self.mesh.faces),
+            "bodies": self.mesh.body_count,
+            "file_from_object": file_from_object(self.mesh).tolist(),
+            **self.measures,
+        }
+        return Shape(file.category, file.object_id, self.mesh, facts=facts, colors=self.colors).normalized()
+
+
+def inspect_mesh(path: Path, root: Path, colors: bool) -> Inspection:
+    """Read and repair one file; what is wrong with it is the result's reason, not an error.
+
+    Args:
+        root: of the data set; materials and buffers outside it are not read.
+        colors: whether to read the file's colours.
+    """
+    try:
+        raw = read_mesh(path, root, colors)
+    except UserError as error:
+        return Inspection(None, reason=str(error))
+    try:
+        repaired = repair(raw.mesh)
+    except UserError as error:
+        return Inspection(
+            raw.mesh, reason=str(error), checksum=_checksum(raw.mesh, None), side_files=raw.side_files
+        )
+    mesh = repaired.mesh
+    own = None if raw.colors is None else raw.colors.at(mesh.vertices)
+    measures = {name: float(value) for name, value in repaired.measures.items()}
+    return Inspection(
+        mesh, own, repaired.steps, measures, checksum=_checksum(mesh, own), side_files=raw.side_files
+    )
+
+
+def file_from_object(mesh: Trimesh) -> NDArray[np.float64]:
+    """The similarity (4, 4) from the object frame to that of the mesh: scale by its diagonal, then move."""
+    low_3, high_3 = mesh.bounds
+    matrix = np.eye(4)
+    matrix[:3, :3] *= np.linalg.norm(high_3 - low_3)
+    matrix[:3, 3] = (low_3 + high_3) / 2
+    return matrix
+
+
+def _checksum(mesh: Trimesh, colors: NDArray[np.uint8] | None) -> str:
+    value = crc32(mesh.vertices.tobytes() + mesh.faces.tobytes())
+    return f"{value if colors is None else crc32(colors.tobytes(), value):08x}"

@@ -1,0 +1,136 @@
+"""Inspected meshes kept on disk: a file is repaired once for all data sets, resolutions and runs.
+
+An entry is named by the content of the file and by the code that reads and repairs it, so that neither a changed file
+nor a changed repair meets an old result. It appears under its name only when it is whole.
+"""
+
+import hashlib
+import json
+import os
+import socket
+import zipfile
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import version
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from trimesh import Trimesh
+
+from stereo_occ.errors import UserError
+from stereo_occ.shapes.inspection import Inspection, inspect_mesh
+from stereo_occ.shapes.reading import digest, read_below
+
+#: What reading an entry raises that is not there or not whole.
+DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
+
+
+class MeshCache:
+    """Inspected meshes in a folder. Files that cannot be read are inspected each time.
+
+    Args:
+        folder: made when the first entry is written.
+        root: of the data set, see :func:`~stereo_occ.shapes.inspection.inspect_mesh`.
+        colors: whether colours are wanted.
+    """
+
+    def __init__(self, folder: Path, root: Path, colors: bool) -> None:
+        self.folder = folder
+        self.root = root
+        self.colors = colors
+
+    def find(self, path: Path) -> Path | None:
+        """The entry of a mesh file, None if it has none or one of the files it refers to has changed."""
+        entry = self._entry(path)
+        try:
+            known = load(entry, header_only=True)
+        except DAMAGED:
+            return None
+        fresh = (
+            digest(read_below(path.parent / name, self.root)) == then
+            for name, then in known.side_files.items()
+        )
+        return entry if known.checksum and all(fresh) else None
+
+    def make(self, path: Path) -> Path:
+        """Inspect a mesh file and write its entry.
+
+        Raises:
+            UserError: the cache cannot be written.
+        """
+        entry = self._entry(path)
+        save(inspect_mesh(path, self.root, self.colors), entry)
+        return entry
+
+    def _entry(self, path: Path) -> Path:
+        key = hashlib.sha256(f"{_code()} {path.suffix.lower()} {self.colors} ".encode())
+        try:
+            key.update(path.read_bytes())
+        except OSError:
+            key.update(str(path).encode(errors="surrogateescape"))
+        return self.folder / f"{key.hexdigest()[:32]}.npz"
+
+
+def save(inspection: Inspection, entry: Path) -> None:
+    """Write an entry so that it is either absent or complete, whatever interrupts the writing."""
+    arrays: dict[str, NDArray[Any]] = {}
+    if inspection.mesh is not None:
+        arrays = {"vertices": inspection.mesh.vertices, "faces": inspection.mesh.faces}
+    if inspection.colors is not None:
+        arrays["colors"] = inspection.colors
+    header = {
+        "steps": inspection.steps,
+        "measures": dict(inspection.measures),
+        "reason": inspection.reason,
+        "checksum": inspection.checksum,
+        "side_files": dict(inspection.side_files),
+    }
+    content = BytesIO()
+    np.savez(content, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **arrays)  # type: ignore[arg-type]
+    temporary = entry.with_name(f".{entry.name}.{socket.gethostname()}.{os.getpid()}.part")
+    try:
+        entry.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("wb") as file:
+            file.write(content.getbuffer())
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(entry)
+    except OSError as error:
+        raise UserError(
+            f"{entry.parent}: cannot be written ({error}); free some disk space or set paths.data"
+        ) from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def load(entry: Path, header_only: bool = False) -> Inspection:
+    """Read an entry.
+
+    Args:
+        header_only: leave out mesh and colours.
+
+    Raises:
+        Exception: one of :data:`DAMAGED` if there is none or it is damaged.
+    """
+    with np.load(entry) as arrays:
+        header = json.loads(arrays["header"].tobytes())
+        mesh = None
+        if "vertices" in arrays and not header_only:
+            mesh = Trimesh(arrays["vertices"], arrays["faces"], process=False)
+        colors = arrays["colors"] if "colors" in arrays and not header_only else None
+    return Inspection(mesh, colors, tuple(header.pop("steps")), **header)
+
+
+@cache
+def _code() -> str:
+    """What a result depends on besides the file: the code of reading and repair, and the libraries they rest on."""
+    here = Path(__file__).parent
+    modules = ("reading.py", "surface_colors.py", "inspection.py", "repair/*.py")
+    parts = [path.read_bytes() for name in modules for path in sorted(here.glob(name))]
+    libraries = [version(name) for name in ("trimesh", "manifold3d", "numpy", "scipy")]
+    return digest(b"".join([*parts, str(libraries + sorted(trimesh.available_formats())).encode()]))

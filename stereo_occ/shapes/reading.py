@@ -1,0 +1,110 @@
+"""What a mesh file holds: triangles in their places, and colours where it has some."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from trimesh import Trimesh
+from trimesh.resolvers import FilePathResolver
+
+from stereo_occ.errors import UserError
+from stereo_occ.shapes.surface_colors import SurfaceColors, surface_colors
+
+
+@dataclass(frozen=True, eq=False)
+class RawMesh:
+    """A file as it was found.
+
+    Attributes:
+        mesh: all parts of the scene in their places, in the file's frame; neither closed nor clean.
+        colors: None where it has none.
+        side_files: SHA-256 of the other files that were read, by name relative to the file's folder; empty text for
+            those that were asked for and not found.
+    """
+
+    mesh: Trimesh
+    colors: SurfaceColors | None
+    side_files: dict[str, str]
+
+
+class SideFiles(FilePathResolver):
+    """Materials, textures and buffers of a model below ``root``; notes which were asked for."""
+
+    def __init__(self, source: Path, root: Path) -> None:
+        super().__init__(str(source))
+        self.root = root.resolve()
+        self.seen: dict[str, str] = {}
+
+    def get(self, name: str) -> bytes:
+        """The content of a file named relative to the model's folder.
+
+        Raises:
+            FileNotFoundError: it is not there, or not below the data set's root.
+        """
+        name = name.strip().replace("\\", "/")
+        content = read_below(Path(self.parent) / name, self.root)
+        self.seen[name] = digest(content)
+        if content is None:
+            raise FileNotFoundError(name)
+        return content
+
+    def namespaced(self, namespace: str) -> "SideFiles":
+        """The same folder: names are kept relative to the model."""
+        return self
+
+
+def read_below(path: Path, root: Path) -> bytes | None:
+    """The content of a file, None where there is none below ``root``."""
+    try:
+        resolved = path.resolve()
+        return resolved.read_bytes() if resolved.is_relative_to(root.resolve()) else None
+    except (OSError, ValueError):  # ValueError: a name that no file can have
+        return None
+
+
+def digest(content: bytes | None) -> str:
+    """SHA-256 as text, empty for None."""
+    return "" if content is None else hashlib.sha256(content).hexdigest()
+
+
+def read_mesh(path: Path, root: Path, colors: bool) -> RawMesh:
+    """Read a file of any known format. Other files that it refers to are read if they lie below ``root``.
+
+    Vertices that the format splits (by normals, texture coordinates, or all of them as STL does) are merged.
+
+    Raises:
+        UserError: the file cannot be read or holds no triangles; the message is the reason alone.
+    """
+    file_type = path.suffix.lower().removeprefix(".")
+    if file_type not in trimesh.available_formats():
+        raise UserError(f"reading {path.suffix} files needs pycollada: pip install 'pycollada>=0.8'")
+    try:
+        return _read(path, root, colors)
+    except (UserError, MemoryError):
+        raise
+    except Exception as error:  # a broken file makes the parsers fail in any way
+        if colors:  # its pictures may be what is broken
+            return read_mesh(path, root, colors=False)
+        raise UserError(
+            f"cannot be read: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        ) from error
+
+
+def _read(path: Path, root: Path, colors: bool) -> RawMesh:
+    side_files = SideFiles(path, root)
+    scene = trimesh.load_scene(path, resolver=side_files, process=False, skip_materials=not colors)
+    parts = [part for part in scene.dump() if isinstance(part, Trimesh) and len(part.faces)]
+    if not parts:
+        raise UserError("holds no triangles")
+    offsets = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    mesh = Trimesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.faces + offset for part, offset in zip(parts, offsets[:-1], strict=True)]),
+        process=False,
+    )
+    if not np.isfinite(mesh.vertices).all():
+        raise UserError("has vertices that are not finite numbers")
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    return RawMesh(mesh, surface_colors(parts) if colors else None, dict(side_files.seen))
