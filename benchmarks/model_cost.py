@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import torch
 from hydra import compose, initialize_config_dir
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 from torch.utils.flop_counter import FlopCounterMode
 
 from stereo_occ.checkpoint import plain
 from stereo_occ.config import register_schemas
-from stereo_occ.data.prepare import build_rig
+from stereo_occ.data.rigs import build_rig
 from stereo_occ.geometry.camera import StereoRig
 from stereo_occ.models.base import OccupancyModel, StereoViews
 from stereo_occ.models.build import COST_VOLUMES, build_model
@@ -79,7 +79,7 @@ def mmac(model: OccupancyModel, rig: StereoRig, points: int) -> tuple[float, flo
 
 def row(name: str, size: Size, cfg: DictConfig) -> str:
     """One line of the table."""
-    rig = build_rig(cfg.rig, size.image_side)
+    rig = build_rig(OmegaConf.to_object(cfg.rig), size.image_side)
     model = build_model(plain(cfg.model), rig)
     encode, decode = mmac(model, rig, size.points)
     parameters = sum(p.numel() for p in model.parameters()) / 1e6

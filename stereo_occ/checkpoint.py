@@ -7,7 +7,7 @@ import torch
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.config import TrainConfig
-from stereo_occ.data.prepare import build_rig
+from stereo_occ.data.rigs import build_rig
 from stereo_occ.errors import UserError
 from stereo_occ.models.build import build_model
 from stereo_occ.task import KEY, VERSION, OccupancyTask

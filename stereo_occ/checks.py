@@ -10,7 +10,8 @@ import torch
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.config import SplitKind
-from stereo_occ.data.prepare import build_rig
+from stereo_occ.data.rigs import RigConfig, ToedInRigConfig, build_rig
+from stereo_occ.data.scene import draw_scene
 from stereo_occ.data.splits import SUBSETS, split_views, subset_sizes
 from stereo_occ.errors import UserError
 from stereo_occ.models.build import build_model
@@ -25,7 +26,8 @@ PRECISIONS = ("32-true", "bf16-mixed", "16-mixed")
 
 def check_pairs(cfg: DictConfig) -> list[str]:
     """Problems of the part of a configuration that describes stereo pairs."""
-    return [*_objects(cfg), *_placement(cfg), *_rig(cfg), *_appearance(cfg)]
+    places = [*_placement(cfg), *_rig(cfg)]
+    return [*_objects(cfg), *(places or _scene(cfg)), *_appearance(cfg)]
 
 
 def check_training(cfg: DictConfig) -> list[str]:
@@ -98,9 +100,19 @@ def _placement(cfg: DictConfig) -> Iterator[str]:
 
 
 def _rig(cfg: DictConfig) -> Iterator[str]:
+    if cfg.rig.kind != ToedInRigConfig.kind:
+        return  # drawing a scene tells
     for key, upper in (("distance", inf), ("half_angle_deg", 90), ("fov_deg", 180)):
         if not 0 < cfg.rig[key] < upper:
             yield f"rig.{key}={cfg.rig[key]}: must be above 0 and below {upper}"
+
+
+def _scene(cfg: DictConfig) -> Iterator[str]:
+    """Draw one, of a cube."""
+    corners_83 = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) / 3**0.5
+    rig, placement = (OmegaConf.to_object(cfg[name]) for name in ("rig", "placement"))
+    rngs = (np.random.default_rng(seed) for seed in range(2))
+    yield from _refusal(draw_scene, rig, placement, max(1, cfg.data.image_side), corners_83, *rngs)
 
 
 def _appearance(cfg: DictConfig) -> Iterator[str]:
@@ -127,7 +139,9 @@ def _split(cfg: DictConfig) -> Iterator[str]:
 
 def _model(cfg: DictConfig) -> Iterator[str]:
     """Build the model without its weights."""
-    rig = build_rig(cfg.rig, cfg.data.image_side)
+    config = OmegaConf.to_object(cfg.rig)
+    assert isinstance(config, RigConfig)
+    rig = build_rig(config, cfg.data.image_side)
     with torch.device("meta"):
         yield from _refusal(build_model, OmegaConf.to_container(cfg.model, resolve=True), rig, False)
 

@@ -11,6 +11,8 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from stereo_occ.data.placement import PlacementConfig
+from stereo_occ.data.rigs import RIG_SCHEMAS, RigConfig, ToedInRigConfig
 from stereo_occ.errors import UserError
 from stereo_occ.models.config import register_schemas as register_model_schemas
 from stereo_occ.render.appearance import BackgroundConfig, LightsConfig, MaterialConfig
@@ -21,13 +23,6 @@ class SplitKind(Enum):
 
     object = "object"  # no object is in two splits
     view = "view"  # the paper's wording: the views of every object are divided
-
-
-class Placement(Enum):
-    """Where the object is."""
-
-    paper = "paper"  # unit diagonal, centred at the fixation point
-    free = "free"  # diagonal log-uniform in [0.4, 1], centre anywhere that keeps it in both views and in the cube
 
 
 class Resume(Enum):
@@ -79,23 +74,6 @@ class MeshesConfig(DataConfig):
 
     name: str = "meshes"
     root: str = MISSING
-
-
-@dataclass
-class RigConfig:
-    """Two cameras on a circle about the fixation point."""
-
-    distance: float = MISSING  # metres from each camera to the fixation point
-    half_angle_deg: float = MISSING  # angle of each camera from the mid-line
-    fov_deg: float = MISSING  # vertical field of view
-
-
-@dataclass
-class PlacementConfig:
-    """Where the object is."""
-
-    kind: Placement = MISSING
-    diagonal: list[float] = MISSING  # log-uniform range of the bounding box diagonal, metres
 
 
 @dataclass
@@ -259,8 +237,11 @@ def training_config(values: dict[str, Any]) -> DictConfig:
         UserError: a key is unknown or a value has the wrong type.
     """
     try:
-        data = {"data": OmegaConf.structured(DATA_SCHEMAS[values["data"]["name"]])}
-        cfg = OmegaConf.merge(OmegaConf.structured(TrainConfig), data, values)
+        kinds = {
+            "data": OmegaConf.structured(DATA_SCHEMAS[values["data"]["name"]]),
+            "rig": OmegaConf.structured(RIG_SCHEMAS[values["rig"].get("kind", ToedInRigConfig.kind)]),
+        }
+        cfg = OmegaConf.merge(OmegaConf.structured(TrainConfig), kinds, values)
     except (KeyError, OmegaConfBaseException) as error:
         raise UserError(
             f"configuration: {str(error).splitlines()[0]}; it was written by another version"
@@ -276,7 +257,7 @@ def register_schemas() -> None:
     for name, root in (("train", TrainConfig), ("render", RenderConfig), ("evaluate", EvaluateConfig)):
         store.store(name=f"base_{name}", node=root)
     for group, schema in (
-        ("rig", RigConfig),
+        ("rig", ToedInRigConfig),
         ("placement", PlacementConfig),
         ("lights", LightsConfig),
         ("material", MaterialConfig),
@@ -294,4 +275,6 @@ def register_schemas() -> None:
         store.store(group=group, name=f"base_{group}", node=schema)
     for name, data_schema in DATA_SCHEMAS.items():
         store.store(group="data", name=f"base_{name}", node=data_schema)
+    for kind, rig_schema in RIG_SCHEMAS.items():
+        store.store(group="rig", name=f"base_{kind}_rig", node=rig_schema)
     register_model_schemas(store)

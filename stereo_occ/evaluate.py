@@ -18,7 +18,7 @@ from stereo_occ.cli import entry_point
 from stereo_occ.config import EvaluateConfig, TrainConfig, training_config
 from stereo_occ.data.datamodule import PairsDataModule
 from stereo_occ.data.examples import examples
-from stereo_occ.data.prepare import build_rig
+from stereo_occ.data.rigs import build_rig
 from stereo_occ.errors import UserError
 from stereo_occ.metrics_file import environment, write_json
 from stereo_occ.pictures import comparison

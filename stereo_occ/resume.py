@@ -9,7 +9,8 @@ from lightning.fabric.plugins import TorchCheckpointIO
 from lightning.pytorch import LightningModule, Trainer
 from lightning.pytorch.callbacks import Checkpoint
 
-from stereo_occ.checkpoint import read_checkpoint
+from stereo_occ.checkpoint import plain, read_checkpoint
+from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
 from stereo_occ.task import KEY
 
@@ -76,7 +77,8 @@ def step_to_resume(checkpoint: Path, config: dict[str, Any]) -> int:
         UserError: it is damaged, or of a run with other settings.
     """
     saved = read_checkpoint(checkpoint)
-    changed = [name for name in FIXED if saved[KEY]["config"].get(name) != config[name]]
+    former = plain(training_config(saved[KEY]["config"]))
+    changed = [name for name in FIXED if former[name] != config[name]]
     if changed:
         raise UserError(
             f"{checkpoint.parent}: holds a run with another {', '.join(changed)}; "

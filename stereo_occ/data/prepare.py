@@ -10,27 +10,22 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from enum import Enum
 from functools import cache
-from math import radians
 from pathlib import Path
 from zlib import crc32
 
 import numpy as np
 from tqdm import tqdm
 
-from stereo_occ.config import PairsConfig, RigConfig
+from stereo_occ.config import PairsConfig
 from stereo_occ.data.objects import ObjectSource, list_objects
-from stereo_occ.data.placement import draw_pose
+from stereo_occ.data.pairs import POINTS_STREAM, render_views
 from stereo_occ.data.processes import start_worker
-from stereo_occ.data.shard import VERSION, Views, remove_partial, write_shard
+from stereo_occ.data.rigs import ToedInRigConfig
+from stereo_occ.data.shard import VERSION, remove_partial, write_shard
 from stereo_occ.errors import UserError
-from stereo_occ.geometry.camera import StereoRig, toed_in_rig
 from stereo_occ.occupancy.pools import box_pool, surface_pool
-from stereo_occ.render.appearance import draw_appearance
 from stereo_occ.render.stereo import StereoRenderer
 from stereo_occ.shapes.folder import Skipped
-
-# Independent random streams of one object.
-POINTS_STREAM, VIEWS_STREAM = 0, 1
 
 
 @dataclass(frozen=True)
@@ -41,11 +36,6 @@ class PreparedShards:
     objects: list[tuple[str, str]]
     paths: list[Path]
     skipped: list[Skipped]
-
-
-def build_rig(config: RigConfig, side: int) -> StereoRig:
-    """The calibrated cameras of a configuration for images of ``side`` pixels."""
-    return toed_in_rig(config.distance, radians(config.half_angle_deg), radians(config.fov_deg), side)
 
 
 def prepare(pairs: PairsConfig, progress: bool) -> PreparedShards:
@@ -88,29 +78,7 @@ def render_object(source: ObjectSource, path: Path, pairs: PairsConfig) -> None:
         "box": box_pool(shape, data.pool_size, points_rng),
         "surface": surface_pool(shape, data.pool_size, points_rng),
     }
-    rig = build_rig(pairs.rig, data.image_side)
-    renderer = _renderer()
-    renderer.load(shape.mesh)
-    rgb, mask, depth, poses = [], [], [], []
-    low, high = pairs.placement.diagonal
-    for view in range(data.views):
-        rng = np.random.default_rng([*object_seed, VIEWS_STREAM, view])
-        pose = draw_pose(pairs.placement.kind.value, (low, high), rig, rng)
-        appearance = draw_appearance(pairs.lights, pairs.material, pairs.background, rng)
-        images = renderer.render(rig, pose.rig_from_object, appearance)
-        rgb.append(images.rgb_2HW3)
-        mask.append(images.mask_2HW)
-        depth.append(images.depth_2HW.astype(np.float16))
-        poses.append(pose.rig_from_object)
-    cameras = (len(poses), 1, 1, 1)
-    views = Views(
-        rgb=np.stack(rgb),
-        mask=np.stack(mask),
-        depth=np.stack(depth),
-        K=np.tile(np.stack([camera.K for camera in rig.cameras]), cameras),
-        camera_from_rig=np.tile(np.stack([camera.camera_from_rig for camera in rig.cameras]), cameras),
-        rig_from_object=np.stack(poses),
-    )
+    views = render_views(shape, pairs, object_seed, _renderer())
     write_shard(path, shape, views, pools)
 
 
@@ -159,12 +127,15 @@ def _description(pairs: PairsConfig) -> dict[str, object]:
         name: asdict(getattr(pairs, name))
         for name in ("rig", "placement", "lights", "material", "background")
     }
+    if parts["rig"]["kind"] == ToedInRigConfig.kind:
+        del parts["rig"]["kind"]
     return _plain({"shard_version": VERSION, "data": data, **parts})  # type: ignore[return-value]
 
 
 def _plain(value: object) -> object:
+    """Without what is off, so that a data set keeps its name when there is more that could be on."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: _plain(item) for key, item in value.items() if item is not None}
     return value.value if isinstance(value, Enum) else value
 
 

@@ -13,6 +13,7 @@ path                                    shape, type         meaning
 ``views/K``                             (N, 2, 3, 3) f8     intrinsics, pixels
 ``views/camera_from_rig``               (N, 2, 4, 4) f8     extrinsics, metres
 ``views/rig_from_object``               (N, 4, 4) f8        pose: scale, rotation, translation
+``views/unit``                          (N,) f8             metres per unit of the rig frame; absent: 1
 ``points/<pool>/grid``                  (P, 3) u2           see :class:`~stereo_occ.occupancy.pools.PointPool`
 ``points/<pool>/bounds``                (2, 3) f8           low corner and extent of the grid, object frame
 ``points/<pool>/part``                  (P,) u1             index into ``stereo_occ.shapes.shape.PARTS``; 0: outside
@@ -60,6 +61,7 @@ class Views:
     K: NDArray[np.float64]
     camera_from_rig: NDArray[np.float64]
     rig_from_object: NDArray[np.float64]
+    unit: NDArray[np.float64] | None = None
 
 
 def write_shard(path: Path, shape: Shape, views: Views, pools: Mapping[str, PointPool]) -> None:
@@ -102,7 +104,8 @@ def _file_image(shape: Shape, views: Views, pools: Mapping[str, PointPool]) -> m
         _write(file, "mesh/vertices", shape.mesh.vertices.astype(np.float32))
         _write(file, "mesh/faces", shape.mesh.faces.astype(np.int32))
         for name, array in vars(views).items():
-            _write(file, f"views/{name}", array, chunk_length=1)
+            if array is not None:
+                _write(file, f"views/{name}", array, chunk_length=1)
         for name, pool in pools.items():
             _write(file, f"points/{name}/grid", pool.grid_N3, chunk_length=POINTS_PER_CHUNK)
             _write(file, f"points/{name}/bounds", np.stack([pool.low_3, pool.extent_3]))
@@ -251,6 +254,11 @@ class Shard:
     def poses(self) -> list[Pose]:
         """The object's pose in each view."""
         return [Pose.from_matrix(matrix) for matrix in self._read("views/rig_from_object")]
+
+    @cached_property
+    def unit_N(self) -> NDArray[np.float64]:
+        """Metres per unit of the rig frame in each view: what turns a reconstruction into metres."""
+        return self._read("views/unit") if "views/unit" in self._file else np.ones(len(self))
 
     @cached_property
     def _pools(self) -> dict[str, PointPool]:

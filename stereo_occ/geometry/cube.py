@@ -46,6 +46,10 @@ class WorkingCube:
     cube_from_source: NDArray[np.float64]
     unit: float
 
+    def cut(self, rig: StereoRig) -> StereoRig:
+        """Other cameras of the same whole images (frame of those given), cut in the same way."""
+        return _cut(rig, self.crops, self.cube_from_source, self.unit)
+
 
 def working_cube(
     rig: StereoRig, boxes: tuple[Box, Box], side: int, fill: float = FILL, margin: float = MARGIN
@@ -75,16 +79,12 @@ def cube_at(
     margin: float = MARGIN,
 ) -> WorkingCube:
     """As :func:`working_cube`, where the centre (frame of the cameras) and side of the cube, metres, are known."""
-    axes_33 = _axes(rig, center_3)
+    axes_33 = view_axes(rig, center_3)
     cube_from_source = np.eye(4)
     cube_from_source[:3, :3] = axes_33 / unit
     cube_from_source[:3, 3] = -axes_33 @ center_3 / unit
     crops = _crops(boxes, side, margin)
-    cameras = (
-        Camera(crop.intrinsics(camera.K), _extrinsics(camera, axes_33, center_3, unit), side, side)
-        for camera, crop in zip(rig.cameras, crops, strict=True)
-    )
-    return WorkingCube(StereoRig(*cameras), crops, cube_from_source, unit)
+    return WorkingCube(_cut(rig, crops, cube_from_source, unit), crops, cube_from_source, unit)
 
 
 def triangulate(
@@ -129,8 +129,12 @@ def _diagonal(camera: Camera, box: Box, center_3: NDArray[np.float64]) -> float:
     return float(2 * distance * np.linalg.norm(np.tan(np.divide(angles_2, 2))))
 
 
-def _axes(rig: StereoRig, center_3: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows: the cube's +X, +Y and +Z in the frame of the cameras."""
+def view_axes(rig: StereoRig, center_3: NDArray[np.float64]) -> NDArray[np.float64]:
+    """+X, +Y and +Z of a cube at a point, as rows, in the frame of the cameras.
+
+    Raises:
+        UserError: if left and right are swapped.
+    """
     z_3 = (rig.left.center + rig.right.center) / 2 - center_3
     z_3 /= np.linalg.norm(z_3)
     x_3 = rig.right.center - rig.left.center
@@ -151,11 +155,17 @@ def _crops(boxes: tuple[Box, Box], side: int, margin: float) -> tuple[Crop, Crop
     return left, right
 
 
-def _extrinsics(
-    camera: Camera, axes_33: NDArray[np.float64], center_3: NDArray[np.float64], unit: float
-) -> NDArray[np.float64]:
-    camera_from_cube = np.eye(4)
-    rotation_33 = camera.camera_from_rig[:3, :3]
-    camera_from_cube[:3, :3] = rotation_33 @ axes_33.T
-    camera_from_cube[:3, 3] = (rotation_33 @ center_3 + camera.camera_from_rig[:3, 3]) / unit
-    return camera_from_cube
+def _cut(
+    rig: StereoRig, crops: tuple[Crop, Crop], cube_from_source: NDArray[np.float64], unit: float
+) -> StereoRig:
+    left, right = (
+        Camera(crop.intrinsics(camera.K), _extrinsics(camera, cube_from_source, unit), crop.side, crop.side)
+        for camera, crop in zip(rig.cameras, crops, strict=True)
+    )
+    return StereoRig(left, right)
+
+
+def _extrinsics(camera: Camera, cube_from_source: NDArray[np.float64], unit: float) -> NDArray[np.float64]:
+    camera_from_cube = camera.camera_from_rig @ np.linalg.inv(cube_from_source)
+    camera_from_cube[:3] /= unit
+    return np.asarray(camera_from_cube)

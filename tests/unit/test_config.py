@@ -157,7 +157,7 @@ def test_the_papers_numbers():
     assert list(cfg.data.fractions) == [0.8, 0.1, 0.1]
     assert (cfg.rig.distance, cfg.rig.half_angle_deg) == (1.0, 180 / 16)
     assert list(cfg.categories.names) == ["mug", "bowl", "bottle"]
-    assert plain(cfg)["placement"] == {"kind": "paper", "diagonal": [1.0, 1.0]}
+    assert plain(cfg)["placement"] == {"kind": "paper", "diagonal": [1.0, 1.0], "standing": None}
     assert (cfg.queries.box, cfg.queries.outside, cfg.queries.surface) == (1, 0, 0)
 
 

@@ -1,0 +1,46 @@
+"""The pictures of one object: scenes and appearances drawn from a configuration, and rendered."""
+
+import numpy as np
+
+from stereo_occ.config import PairsConfig
+from stereo_occ.data.rigs import RectifiedRigConfig
+from stereo_occ.data.scene import Scene, draw_scene
+from stereo_occ.data.shard import Views
+from stereo_occ.render.appearance import draw_appearance
+from stereo_occ.render.stereo import StereoImages, StereoRenderer
+from stereo_occ.shapes.shape import Shape
+
+# Independent random streams of one object. What is drawn from one does not change what is drawn from another.
+POINTS_STREAM, VIEWS_STREAM, SCENE_STREAM = range(3)
+
+
+def render_views(shape: Shape, pairs: PairsConfig, object_seed: list[int], renderer: StereoRenderer) -> Views:
+    """All views of an object; each is a function of the configuration, ``object_seed`` and its number alone.
+
+    Raises:
+        UserError: for ranges out of their limits, or if OpenGL cannot be started.
+    """
+    renderer.load(shape.mesh)
+    hull_N3 = shape.mesh.vertices
+    if isinstance(pairs.rig, RectifiedRigConfig):
+        hull_N3 = shape.mesh.convex_hull.vertices
+    scenes: list[Scene] = []
+    pictures: list[StereoImages] = []
+    for view in range(pairs.data.views):
+        rng, scene_rng = (
+            np.random.default_rng([*object_seed, stream, view]) for stream in (VIEWS_STREAM, SCENE_STREAM)
+        )
+        scene = draw_scene(pairs.rig, pairs.placement, pairs.data.image_side, hull_N3, rng, scene_rng)
+        appearance = draw_appearance(pairs.lights, pairs.material, pairs.background, rng)
+        pictures.append(renderer.render(scene.true_rig, scene.pose.rig_from_object, appearance))
+        scenes.append(scene)
+    unit_N = np.array([scene.unit for scene in scenes])
+    return Views(
+        rgb=np.stack([images.rgb_2HW3 for images in pictures]),
+        mask=np.stack([images.mask_2HW for images in pictures]),
+        depth=np.stack([images.depth_2HW.astype(np.float16) for images in pictures]),
+        K=np.stack([[camera.K for camera in scene.rig.cameras] for scene in scenes]),
+        camera_from_rig=np.stack([[camera.camera_from_rig for camera in s.rig.cameras] for s in scenes]),
+        rig_from_object=np.stack([scene.pose.rig_from_object for scene in scenes]),
+        unit=unit_N if (unit_N != 1).any() else None,
+    )
