@@ -14,49 +14,52 @@ from stereo_occ.models.sampling import Projections, sample_maps
 class PairEvidence(nn.Module):
     """Features of points from the views they are seen in, the same if left and right change places.
 
-    A layer that both views share embeds each view's features with the point's place in that camera's frame; the mean
-    over the views that see the point follows. Where both do, correlation by groups of channels (Guo et al., GwcNet,
-    CVPR 2019) and the difference of the features are added, elsewhere 0. One view alone counts as a pair whose other
-    view sees nothing.
+    Both views' maps pass one linear layer and are then read at the points, which are many more than the maps' cells;
+    the layer would give the same after the reading. What is read, with the point's place in that camera's frame added
+    by another linear layer, is rectified and averaged over the views that see the point. Where both do, the
+    correlation of what was read by groups of channels (Guo et al., GwcNet, CVPR 2019) and its difference follow,
+    elsewhere 0. One view alone counts as a pair whose other view sees nothing.
 
     Args:
-        channels: of the sampled maps.
+        channels: of the maps.
         groups: of channels, for the correlation.
-        width: channels of the embedding.
+        width: channels that are read.
         difference: even function of the difference of the features.
 
     Raises:
-        UserError: if the groups do not divide the channels.
+        UserError: if the groups do not divide the width.
 
     Attributes:
-        out_channels: width + groups + channels + 2 flags: whether both views see the point, and the share that do.
+        out_channels: 2 width + groups + 2 flags: whether both views see the point, and the share that do.
     """
 
     def __init__(
         self, channels: int, groups: int, width: int, difference: Callable[[Tensor], Tensor]
     ) -> None:
         super().__init__()
-        if channels % groups:
-            raise UserError(f"model.groups: must divide the encoder's {channels} channels, got {groups}")
+        if width % groups:
+            raise UserError(f"model.groups: must divide the {width} channels of the evidence, got {groups}")
         self.groups = groups
         self.difference = difference
-        self.view = nn.Linear(channels + 4, width)
-        self.out_channels = width + groups + channels + 2
+        self.reduce = nn.Conv2d(channels, width, 1)
+        self.place = nn.Linear(4, width, bias=False)
+        self.out_channels = 2 * width + groups + 2
 
     def forward(self, features_VBCHW: Tensor, points: Projections) -> Tensor:
-        """Maps of one or two views and points in them to ``(B, N, out_channels)``."""
-        samples_VBNC = sample_maps(features_VBCHW, points.positions_VBN2)
-        seen_VBN1 = points.visible_VBN[..., None]
-        place_VBN4 = torch.cat([points.offsets_VBN3, points.depths_VBN[..., None].log()], dim=-1)
-        views_VBNE = relu(self.view(torch.cat([samples_VBNC, place_VBN4], dim=-1)))
-        count_BN1 = seen_VBN1.sum(dim=0)
-        mean_BNE = (views_VBNE * (seen_VBN1 / count_BN1.clamp(min=1))).sum(dim=0)
-        views = samples_VBNC.unbind()
-        left_BNC, right_BNC = views[0], views[-1]
-        both_BN1 = (count_BN1 == 2).float()
-        correlation_BNG = groupwise_correlation(left_BNC, right_BNC, self.groups) * both_BN1
-        difference_BNC = self.difference(left_BNC - right_BNC) * both_BN1
-        return torch.cat([mean_BNE, correlation_BNG, difference_BNC, both_BN1, count_BN1 / 2], dim=-1)
+        """Maps of one or two views and points in them to ``(B, out_channels, N)``."""
+        reduced_VBCHW = self.reduce(features_VBCHW.flatten(0, 1)).unflatten(0, features_VBCHW.shape[:2])
+        samples_VBCN = sample_maps(reduced_VBCHW, points.positions_VBN2)
+        place_VB4N = torch.cat([points.offsets_VBN3.mT, points.depths_VBN[:, :, None].log()], dim=2)
+        views_VBCN = relu(add_linear(samples_VBCN, self.place.weight, place_VB4N))
+        seen_VB1N = points.visible_VBN[:, :, None].to(samples_VBCN.dtype)
+        count_B1N = seen_VB1N.sum(dim=0)
+        weights_VB1N = seen_VB1N / count_B1N.clamp(min=1)
+        mean_BCN = sum(view * weight for view, weight in zip(views_VBCN, weights_VB1N, strict=True))
+        left_BCN, right_BCN = samples_VBCN[0], samples_VBCN[-1]
+        both_B1N = (count_B1N == 2).to(samples_VBCN.dtype)
+        correlation_BGN = groupwise_correlation(left_BCN, right_BCN, self.groups) * both_B1N
+        difference_BCN = self.difference((left_BCN - right_BCN) * both_B1N)
+        return torch.cat([mean_BCN, correlation_BGN, difference_BCN, both_B1N, count_B1N / 2], dim=1)
 
 
 class GlobalCode(nn.Module):
@@ -75,9 +78,17 @@ class GlobalCode(nn.Module):
         return code_BC
 
 
-def groupwise_correlation(left_C: Tensor, right_C: Tensor, groups: int) -> Tensor:
-    """Products of features ``(..., C)`` averaged over each of ``(..., groups)`` groups of channels."""
-    return (left_C * right_C).view(*left_C.shape[:-1], groups, -1).mean(dim=-1)
+def add_linear(sum_ABCN: Tensor, weight_CD: Tensor, x_ABDN: Tensor) -> Tensor:
+    """Add the linear layer of every column to ``sum_ABCN`` without a copy in another order of the axes."""
+    matrices_MCD = weight_CD.expand(sum_ABCN.shape[:2].numel(), -1, -1)
+    added_MCN = torch.baddbmm(sum_ABCN.flatten(0, 1), matrices_MCD, x_ABDN.flatten(0, 1))
+    return added_MCN.view_as(sum_ABCN)
+
+
+def groupwise_correlation(left_BCN: Tensor, right_BCN: Tensor, groups: int) -> Tensor:
+    """Products of features averaged over each group of channels, ``(B, groups, N)``."""
+    B, _, N = left_BCN.shape
+    return (left_BCN * right_BCN).view(B, groups, -1, N).mean(dim=2)
 
 
 def positional_encoding(points_BN3: Tensor, frequencies: int) -> Tensor:

@@ -13,6 +13,7 @@ from stereo_occ.models.point_decoder import PointDecoder
 from stereo_occ.models.sampling import Projections, project_points, ray_maps
 
 VIEWS = {"both": (0, 1), "left": (0,), "left_twice": (0, 0)}
+PIXEL_CHANNELS = 8  # of the evidence read from the images themselves
 SAMPLES = 65536  # points times batch that are answered at once, which bounds the memory
 
 
@@ -22,24 +23,25 @@ class CalibratedMaps:
 
     Attributes:
         features_VBCHW: maps of one or two views.
+        images_VB3HW: their images.
         K_VB33, camera_from_rig_VB44: their cameras.
-        width, height: of the images, pixels.
     """
 
     features_VBCHW: Tensor
+    images_VB3HW: Tensor
     K_VB33: Tensor
     camera_from_rig_VB44: Tensor
-    width: int
-    height: int
 
     def project(self, points_BN3: Tensor) -> Projections:
         """Rig-frame points in each view."""
-        return project_points(points_BN3, self.K_VB33, self.camera_from_rig_VB44, self.width, self.height)
+        height, width = self.images_VB3HW.shape[-2:]
+        return project_points(points_BN3, self.K_VB33, self.camera_from_rig_VB44, width, height)
 
     def rays(self) -> Tensor:
         """Lines of sight ``(V, B, 6, H, W)`` of the maps' cells."""
         height, width = self.features_VBCHW.shape[-2:]
-        return ray_maps(self.K_VB33, self.camera_from_rig_VB44, height, width, self.width // width)
+        stride = self.images_VB3HW.shape[-1] // width
+        return ray_maps(self.K_VB33, self.camera_from_rig_VB44, height, width, stride)
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,8 @@ class PixelStereoCode:
 class PixelStereoModel(OccupancyModel):
     """Shared encoder, projected points, residual decoder.
 
-    Pixel-aligned features (Saito et al., "PIFu", ICCV 2019) with what a calibrated pair adds. The cameras are an input.
-    Nothing changes if left and right change places with their cameras.
+    Pixel-aligned features (Saito et al., "PIFu", ICCV 2019) with what a calibrated pair adds, and the pixels, which are
+    finer than the features. The cameras are an input. Nothing changes if left and right change places with them.
 
     Args:
         extra: channels that a subclass adds to the token.
@@ -87,9 +89,10 @@ class PixelStereoModel(OccupancyModel):
         self.views = VIEWS[views]
         self.frequencies = frequencies
         self.encoder = encoder
-        self.evidence = PairEvidence(encoder.channels, groups, hidden, torch.abs)
+        self.evidence = PairEvidence(encoder.channels, groups, encoder.channels, torch.abs)
+        self.pixels = PairEvidence(3, 1, PIXEL_CHANNELS, torch.abs)
         self.global_code = GlobalCode(encoder.channels, code_size)
-        token_size = self.evidence.out_channels + 3 + 6 * frequencies + extra
+        token_size = self.evidence.out_channels + self.pixels.out_channels + 3 + 6 * frequencies + extra
         self.decoder = PointDecoder(token_size, code_size, hidden=hidden, blocks=blocks)
 
     def encode(self, views: StereoViews) -> PixelStereoCode:
@@ -100,15 +103,13 @@ class PixelStereoModel(OccupancyModel):
     def calibrated_maps(self, views: StereoViews) -> CalibratedMaps:
         """Features of the chosen views with their cameras."""
         index = list(self.views)
-        images = (views.left_BCHW, views.right_BCHW)[: max(index) + 1]
-        features_VBCHW = torch.stack(self.encoder(torch.cat(images)).chunk(len(images)))
-        height, width = views.left_BCHW.shape[-2:]
+        images_VB3HW = torch.stack((views.left_BCHW, views.right_BCHW)[: max(index) + 1])
+        features_VBCHW = self.encoder(images_VB3HW.flatten(0, 1)).unflatten(0, images_VB3HW.shape[:2])
         return CalibratedMaps(
             features_VBCHW[index],
+            images_VB3HW[index],
             views.K_B233[:, index].transpose(0, 1),
             views.camera_from_rig_B244[:, index].transpose(0, 1),
-            width,
-            height,
         )
 
     def decode(self, code: PixelStereoCode, points_BN3: Tensor) -> Tensor:
@@ -124,5 +125,9 @@ class PixelStereoModel(OccupancyModel):
 
     def token(self, code: PixelStereoCode, points_BN3: Tensor) -> Tensor:
         """Evidence and place ``(B, N, T)`` of each point."""
-        evidence_BNE = self.evidence(code.maps.features_VBCHW, code.maps.project(points_BN3))
-        return torch.cat([evidence_BNE, positional_encoding(points_BN3, self.frequencies)], dim=-1)
+        projections = code.maps.project(points_BN3)
+        evidence_BEN = self.evidence(code.maps.features_VBCHW, projections)
+        pixels_BEN = self.pixels(code.maps.images_VB3HW, projections)
+        return torch.cat(
+            [evidence_BEN.mT, pixels_BEN.mT, positional_encoding(points_BN3, self.frequencies)], dim=-1
+        )

@@ -19,7 +19,7 @@ class SweptVolume(nn.Module):
     """Evidence of both views at each cell of a grid over the cube ``[-0.5, 0.5]^3`` of the rig frame.
 
     A plane sweep (Collins, CVPR 1996) in world space: the cells are projected with the cameras given, so any rig will
-    do, toed in or not. Each cell has both views' features, their correlation and squared difference, and its place.
+    do, toed in or not. Each cell has both views' evidence, with their features' squared difference, and its place.
 
     Args:
         channels, groups: of the maps, see :class:`~stereo_occ.models.evidence.PairEvidence`.
@@ -33,15 +33,18 @@ class SweptVolume(nn.Module):
         super().__init__()
         self.cells = cells
         self.register_buffer("centers_N3", cell_centers(cells), persistent=False)
-        self.evidence = PairEvidence(channels, groups, 2 * width, torch.square)
-        self.merge = nn.Linear(self.evidence.out_channels + 3, width, bias=False)
+        self.evidence = PairEvidence(channels, groups, width, torch.square)
+        self.merge = nn.Linear(self.evidence.out_channels, width, bias=False)
+        self.place = nn.Linear(3, width, bias=False)
 
     def forward(self, maps: CalibratedMaps) -> Tensor:
-        """Volumes ``(B, width, cells, cells, cells)``, axes z, y, x, channels last in memory."""
+        """Volumes ``(B, width, cells, cells, cells)``, axes z, y, x."""
         centers_BN3 = self.centers_N3.expand(maps.features_VBCHW.shape[1], -1, -1)
-        evidence_BNE = self.evidence(maps.features_VBCHW, maps.project(centers_BN3))
-        volume_BNC: Tensor = self.merge(torch.cat([evidence_BNE, centers_BN3], dim=-1))
-        return volume_BNC.view(-1, *(self.cells,) * 3, volume_BNC.shape[-1]).permute(0, 4, 1, 2, 3)
+        evidence_BEN = self.evidence(maps.features_VBCHW, maps.project(centers_BN3))
+        place_CN = self.place(self.centers_N3).mT
+        matrices_BCE = self.merge.weight.expand(len(evidence_BEN), -1, -1)
+        volume_BCN = torch.baddbmm(place_CN, matrices_BCE, evidence_BEN)
+        return volume_BCN.view(*volume_BCN.shape[:2], *(self.cells,) * 3)
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class PlaneSweepStereoModel(PixelStereoModel):
     ) -> None:
         super().__init__(
             encoder,
-            2 * widths[0],
+            widths[0],
             views=views,
             groups=groups,
             frequencies=frequencies,
@@ -87,7 +90,7 @@ class PlaneSweepStereoModel(PixelStereoModel):
             blocks=blocks,
         )
         self.sweep = SweptVolume(encoder.channels, groups, grid, widths[0])
-        self.unet = UNet3d(widths, 2 * widths[0])
+        self.unet = UNet3d(widths)
         if grid % self.unet.multiple:
             raise UserError(
                 f"model.grid: must be a multiple of {self.unet.multiple} for {len(widths)} model.widths, got {grid}"
@@ -102,5 +105,5 @@ class PlaneSweepStereoModel(PixelStereoModel):
         """Evidence, place and the volume's features ``(B, N, T)`` of each point."""
         assert isinstance(code, PlaneSweepCode)
         return torch.cat(
-            [super().token(code, points_BN3), sample_volume(code.volume_BCDHW, points_BN3)], dim=-1
+            [super().token(code, points_BN3), sample_volume(code.volume_BCDHW, points_BN3).mT], dim=-1
         )

@@ -48,7 +48,10 @@ def project_points(
 
 
 def sample_maps(features_VBCHW: Tensor, positions_VBN2: Tensor) -> Tensor:
-    """Features ``(V, B, N, C)`` at positions of maps of any stride, bilinear, float32; the edge's own beyond it."""
+    """Features ``(V, B, C, N)`` at positions of maps of any stride, bilinear; the edge's own beyond it.
+
+    Interpolated in float32, returned in the type of the maps.
+    """
     V, B, N, _ = positions_VBN2.shape
     samples_MCN1 = grid_sample(
         features_VBCHW.float().flatten(0, 1),
@@ -56,7 +59,7 @@ def sample_maps(features_VBCHW: Tensor, positions_VBN2: Tensor) -> Tensor:
         padding_mode="border",
         align_corners=False,
     )
-    return samples_MCN1.squeeze(-1).mT.reshape(V, B, N, -1)
+    return samples_MCN1.view(V, B, -1, N).to(features_VBCHW.dtype)
 
 
 def cell_centers(cells: int) -> Tensor:
@@ -67,7 +70,7 @@ def cell_centers(cells: int) -> Tensor:
 
 
 def sample_volume(volume_BCDHW: Tensor, points_BN3: Tensor) -> Tensor:
-    """Features ``(B, N, C)`` of a volume over the grid of :func:`cell_centers`, trilinear, float32."""
+    """Features ``(B, C, N)`` of a volume over the grid of :func:`cell_centers`, trilinear, as :func:`sample_maps`."""
     B, N, _ = points_BN3.shape
     samples_BCN11 = grid_sample(
         volume_BCDHW.float(),
@@ -75,7 +78,7 @@ def sample_volume(volume_BCDHW: Tensor, points_BN3: Tensor) -> Tensor:
         padding_mode="border",
         align_corners=False,
     )
-    return samples_BCN11.flatten(2).mT
+    return samples_BCN11.flatten(2).to(volume_BCDHW.dtype)
 
 
 def ray_maps(K_VB33: Tensor, camera_from_rig_VB44: Tensor, height: int, width: int, stride: int) -> Tensor:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
+import torch
 from torch import Tensor, nn
 from torch.nn.functional import interpolate
 
@@ -27,29 +28,25 @@ class UNet3d(nn.Module):
 
     Args:
         widths: channels of each level, the finest first; each level has half the cells per side of the one before.
-        out_channels: of the result.
 
     Attributes:
         multiple: sides must be a multiple of this many cells.
     """
 
-    def __init__(self, widths: Sequence[int], out_channels: int) -> None:
+    def __init__(self, widths: Sequence[int]) -> None:
         super().__init__()
         self.multiple = 2 ** (len(widths) - 1)
-        self.entry = ResidualBlock3d(widths[0])
         self.down = nn.ModuleList(
             nn.Sequential(*_normalized_conv(fine, coarse, stride=2), ResidualBlock3d(coarse))
             for fine, coarse in pairwise(widths)
         )
         self.lift = nn.ModuleList(nn.Conv3d(coarse, fine, 1, bias=False) for fine, coarse in pairwise(widths))
         self.up = nn.ModuleList(ResidualBlock3d(fine) for fine in widths[:-1])
-        self.exit = nn.Sequential(
-            nn.BatchNorm3d(widths[0]), nn.ReLU(inplace=True), nn.Conv3d(widths[0], out_channels, 1)
-        )
+        self.exit = nn.Sequential(nn.BatchNorm3d(widths[0]), nn.ReLU(inplace=True))
 
     def forward(self, volume_BCDHW: Tensor) -> Tensor:
-        """``(B, widths[0], D, H, W)`` to ``(B, out_channels, D, H, W)``."""
-        x_BCDHW = self.entry(volume_BCDHW)
+        """``(B, widths[0], D, H, W)`` to the same shape."""
+        x_BCDHW = volume_BCDHW.contiguous(memory_format=torch.channels_last_3d)
         finer = []
         for down in self.down:
             finer.append(x_BCDHW)

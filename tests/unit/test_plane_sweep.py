@@ -33,15 +33,18 @@ def image_of_plane(camera, z):
 
 
 def maps_of(rigs, images):
-    return CalibratedMaps(torch.tensor(np.array(images)).float(), *cameras_VB(rigs), WIDTH, HEIGHT)
+    features = torch.tensor(np.array(images)).float()
+    return CalibratedMaps(features, features, *cameras_VB(rigs))
 
 
 def correlations(maps, points_BN3):
     """Correlation and the flag that both views see, each ``(B, N)``."""
-    evidence = PairEvidence(CHANNELS, 1, 4, torch.square)
+    evidence = PairEvidence(CHANNELS, 1, CHANNELS, torch.square)
+    torch.nn.init.dirac_(evidence.reduce.weight)
+    torch.nn.init.zeros_(evidence.reduce.bias)
     with torch.no_grad():
         values = evidence(maps.features_VBCHW, maps.project(torch.as_tensor(points_BN3).float())).numpy()
-    return values[..., 4], values[..., -2] > 0
+    return values[:, CHANNELS], values[:, -2] > 0
 
 
 def test_correlation_along_a_line_of_sight_peaks_at_the_textured_plane():
@@ -67,9 +70,9 @@ def test_correlation_along_a_line_of_sight_peaks_at_the_textured_plane():
 
 
 def test_groupwise_correlation_is_the_mean_product_of_each_group():
-    left, right = torch.randn(2, 3, 5, 6)
-    expected = [(left[..., g : g + 2] * right[..., g : g + 2]).mean(dim=-1) for g in (0, 2, 4)]
-    torch.testing.assert_close(groupwise_correlation(left, right, 3), torch.stack(expected, dim=-1))
+    left, right = torch.randn(2, 3, 6, 5)
+    expected = [(left[:, g : g + 2] * right[:, g : g + 2]).mean(dim=1) for g in (0, 2, 4)]
+    torch.testing.assert_close(groupwise_correlation(left, right, 3), torch.stack(expected, dim=1))
 
 
 def test_positional_encoding_has_sines_and_cosines_of_each_frequency():
@@ -89,10 +92,9 @@ def pair_maps(batch=3, seed=0):
 def one_view(maps, view):
     return CalibratedMaps(
         maps.features_VBCHW[view : view + 1],
+        maps.images_VB3HW[view : view + 1],
         maps.K_VB33[view : view + 1],
         maps.camera_from_rig_VB44[view : view + 1],
-        WIDTH,
-        HEIGHT,
     )
 
 
@@ -101,7 +103,7 @@ def test_a_point_that_one_view_sees_has_that_views_evidence_and_no_comparison():
     points = 3 * torch.rand(3, 400, 3) - 1.5
     with torch.no_grad():
         pair, left, right = (
-            evidence(m.features_VBCHW, m.project(points))
+            evidence(m.features_VBCHW, m.project(points)).mT
             for m in (maps, one_view(maps, 0), one_view(maps, 1))
         )
     seen = maps.project(points).visible_VBN.bool()
@@ -117,19 +119,18 @@ def test_a_point_that_one_view_sees_has_that_views_evidence_and_no_comparison():
 
 
 def test_the_volume_at_a_cells_centre_is_the_evidence_of_that_point():
-    maps, sweep = pair_maps(), SweptVolume(8, 2, cells=6, width=5)
+    maps, sweep = pair_maps(), SweptVolume(8, 2, cells=6, width=6)
     centers = sweep.centers_N3.expand(3, -1, -1)
     with torch.no_grad():
         volume = sweep(maps)
         evidence = sweep.evidence(maps.features_VBCHW, maps.project(centers))
-        expected = sweep.merge(torch.cat([evidence, centers], dim=-1))
-    assert volume.shape == (3, 5, 6, 6, 6)
-    assert volume.is_contiguous(memory_format=torch.channels_last_3d)
-    torch.testing.assert_close(sample_volume(volume, centers), expected)
+        expected = evidence.mT @ sweep.merge.weight.T + sweep.place(centers)
+    assert volume.shape == (3, 6, 6, 6, 6)
+    torch.testing.assert_close(sample_volume(volume, centers).mT, expected)
 
 
 def test_a_volume_network_sees_the_whole_grid_and_keeps_its_axes():
-    network = UNet3d([4, 4, 4, 4], 2).eval()
+    network = UNet3d([4, 4, 4, 4]).eval()
     volume = torch.randn(1, 4, 8, 8, 8)
     poked = volume.clone()
     poked[..., 0, 0, 0] += 1
@@ -147,7 +148,7 @@ def test_a_grid_that_cannot_be_halved_is_refused():
 
 
 def test_groups_must_divide_the_channels():
-    with pytest.raises(UserError, match=r"model\.groups: must divide the encoder's 8 channels, got 3"):
+    with pytest.raises(UserError, match=r"model\.groups: must divide the 4 channels of the evidence, got 3"):
         PairEvidence(8, 3, 4, torch.abs)
 
 
@@ -164,5 +165,5 @@ def test_the_volume_alone_tells_samples_apart():
         code.volume_BCDHW[1] += 1
         other = model.token(code, points)
     torch.testing.assert_close(same[0], other[0])
-    torch.testing.assert_close(same[1, :, :-8], other[1, :, :-8])
-    torch.testing.assert_close(same[1, :, -8:] + 1, other[1, :, -8:])
+    torch.testing.assert_close(same[1, :, :-4], other[1, :, :-4])
+    torch.testing.assert_close(same[1, :, -4:] + 1, other[1, :, -4:])
