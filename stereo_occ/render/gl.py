@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from stereo_occ.errors import UserError
-from stereo_occ.render.drawing import renderer_class
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
 
@@ -62,7 +61,8 @@ def process_renderer(width: int, height: int) -> Any:
         pyrender = import_pyrender()
         try:
             offscreen = pyrender.OffscreenRenderer(width, height)
-            offscreen._renderer = renderer_class(pyrender.renderer)(width, height)
+            drawing = importlib.import_module("stereo_occ.render.drawing")  # imports OpenGL
+            offscreen._renderer = drawing.FastRenderer(width, height)
         except Exception as error:
             raise _no_gl(error) from error
         _renderer, _owner = offscreen, os.getpid()
