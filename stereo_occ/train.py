@@ -15,6 +15,7 @@ from stereo_occ.checks import check_training
 from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
 from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.memory import keep_freed_memory
 from stereo_occ.metrics_file import WriteMetrics
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.resume import AtomicCheckpoints, SaveLatest, step_to_resume
@@ -26,6 +27,7 @@ def train(cfg: DictConfig, folder: Path) -> lightning.Trainer:
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
     quiet_libraries()
+    keep_freed_memory()
     if typed.trainer.threads:
         torch.set_num_threads(typed.trainer.threads)
     latest = folder / "last.ckpt"
