@@ -9,7 +9,8 @@ import numpy as np
 import torch
 from omegaconf import DictConfig, OmegaConf
 
-from stereo_occ.config import SplitKind
+from stereo_occ.data.config import SplitKind
+from stereo_occ.data.look import check_look
 from stereo_occ.data.rigs import RigConfig, ToedInRigConfig, build_rig
 from stereo_occ.data.scene import draw_scene
 from stereo_occ.data.splits import SUBSETS, split_views, subset_sizes
@@ -22,12 +23,18 @@ from stereo_occ.shapes.shape import CATEGORIES
 
 ACCELERATORS = ("cpu", "gpu", "auto")
 PRECISIONS = ("32-true", "bf16-mixed", "16-mixed")
+LOOKS = ("lights", "material", "texture", "background", "sensor")
 
 
 def check_pairs(cfg: DictConfig) -> list[str]:
     """Problems of the part of a configuration that describes stereo pairs."""
     places = [*_placement(cfg), *_rig(cfg)]
     return [*_objects(cfg), *(places or _scene(cfg)), *_appearance(cfg)]
+
+
+def check_rendering(cfg: DictConfig) -> list[str]:
+    """Problems of a rendering configuration."""
+    return [*check_pairs(cfg), *_known("subset", cfg.subset, (*SUBSETS, "all"))]
 
 
 def check_training(cfg: DictConfig) -> list[str]:
@@ -47,14 +54,14 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
     problems = [
         *_at_least(1, cfg, "views", "points", "batch_size", "mesh_resolution"),
         *_at_least(0, cfg, "examples", "workers"),
-        *_known("subset", cfg.subset, (*SUBSETS, "all")),
+        *_known("subset", cfg.subset, (*SUBSETS, "all", "auto")),
         *_hardware(cfg),
     ]
     if not Path(cfg.checkpoint).is_file():
         problems.append(
             f"checkpoint={cfg.checkpoint}: no such file; give the path of a .ckpt file of a training run"
         )
-    if cfg.data is not None and cfg.data.name == "meshes":
+    if cfg.data is not None and "root" in cfg.data:
         problems += _folder(cfg)
     return problems
 
@@ -87,7 +94,9 @@ def _objects(cfg: DictConfig) -> Iterator[str]:
 
 def _folder(cfg: DictConfig) -> Iterator[str]:
     if not Path(cfg.data.root).is_dir():
-        yield f"data.root={cfg.data.root}: no such folder; give a folder laid out as category/name/model.*"
+        yield f"data.root={cfg.data.root}: no such folder; give the folder of the meshes"
+    if not cfg.data.time_limit > 0:
+        yield f"data.time_limit={cfg.data.time_limit}: must be above 0 seconds"
 
 
 def _placement(cfg: DictConfig) -> Iterator[str]:
@@ -120,8 +129,8 @@ def _appearance(cfg: DictConfig) -> Iterator[str]:
         if len(cfg.background[key]) != 3:
             yield f"background.{key}={cfg.background[key]}: must be three values, red, green and blue"
             return
-    looks = (OmegaConf.to_object(cfg[name]) for name in ("lights", "material", "background"))
-    yield from _refusal(draw_appearance, *looks, np.random.default_rng(0))
+    parts = {name: OmegaConf.to_object(cfg[name]) for name in LOOKS}
+    yield from _refusal(check_look, *(parts[name] for name in LOOKS))
 
 
 def _split(cfg: DictConfig) -> Iterator[str]:

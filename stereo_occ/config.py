@@ -11,18 +11,14 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from stereo_occ.data.config import DATA_SCHEMAS, DataConfig
 from stereo_occ.data.placement import PlacementConfig
 from stereo_occ.data.rigs import RIG_SCHEMAS, RigConfig, ToedInRigConfig
 from stereo_occ.errors import UserError
 from stereo_occ.models.config import register_schemas as register_model_schemas
 from stereo_occ.render.appearance import BackgroundConfig, LightsConfig, MaterialConfig
-
-
-class SplitKind(Enum):
-    """What is held out."""
-
-    object = "object"  # no object is in two splits
-    view = "view"  # the paper's wording: the views of every object are divided
+from stereo_occ.render.sensor import SensorConfig
+from stereo_occ.render.texture import TextureConfig
 
 
 class Resume(Enum):
@@ -45,35 +41,6 @@ class ScaleConfig:
     decoder_hidden: int = MISSING
     decoder_blocks: int = MISSING
     disparities: int = MISSING  # cells of the one-sided correlation volume
-
-
-@dataclass
-class DataConfig:
-    """Which objects, how many views of each, how they are divided."""
-
-    name: str = MISSING
-    seed: int = MISSING  # of objects, poses, appearances and point pools; apart from the seed of training
-    views: int = MISSING
-    image_side: int = MISSING
-    pool_size: int = MISSING  # labelled points per pool and object
-    split: SplitKind = MISSING
-    fractions: list[float] = MISSING  # train, val, test
-
-
-@dataclass
-class ProceduralConfig(DataConfig):
-    """Generated mugs, bowls and bottles."""
-
-    name: str = "procedural"
-    counts: dict[str, int] = MISSING
-
-
-@dataclass
-class MeshesConfig(DataConfig):
-    """A folder of meshes, ``category/name/model.*``."""
-
-    name: str = "meshes"
-    root: str = MISSING
 
 
 @dataclass
@@ -100,7 +67,9 @@ class PairsConfig:
     placement: PlacementConfig = MISSING
     lights: LightsConfig = MISSING
     material: MaterialConfig = MISSING
+    texture: TextureConfig = field(default_factory=TextureConfig)  # runs of before there were any have none
     background: BackgroundConfig = MISSING
+    sensor: SensorConfig = field(default_factory=SensorConfig)
     categories: CategoriesConfig = MISSING
     scale: ScaleConfig = MISSING
     paths: PathsConfig = MISSING
@@ -199,7 +168,7 @@ class EvaluateConfig:
     """``python -m stereo_occ.evaluate``; what is null is taken from the checkpoint."""
 
     checkpoint: str = MISSING
-    subset: str = MISSING
+    subset: str = MISSING  # train, val, test, all; auto: all of other meshes than the checkpoint's, else test
     views: int = MISSING  # poses per object
     points: int = MISSING  # per view and metric
     batch_size: int = MISSING  # views per forward pass
@@ -210,7 +179,9 @@ class EvaluateConfig:
     placement: Any = None
     lights: Any = None
     material: Any = None
+    texture: Any = None
     background: Any = None
+    sensor: Any = None
     categories: Any = None
     paths: PathsConfig = MISSING
     trainer: TrainerConfig = MISSING
@@ -219,15 +190,18 @@ class EvaluateConfig:
 
 
 @dataclass
+class InspectConfig(PairsConfig):
+    """``python -m stereo_occ.inspect``"""
+
+    progress: bool = True
+
+
+@dataclass
 class RenderConfig(PairsConfig):
     """``python -m stereo_occ.render``"""
 
+    subset: str = "all"  # train, val, test or all
     progress: bool = field(default=True)
-
-
-DATA_SCHEMAS: dict[str, type[DataConfig]] = {
-    schema.name: schema for schema in (ProceduralConfig, MeshesConfig)
-}
 
 
 def training_config(values: dict[str, Any]) -> DictConfig:
@@ -254,14 +228,21 @@ def register_schemas() -> None:
     """Tell Hydra the schemas and OmegaConf the resolver ``divide`` (whole, at least 1); safe to call again."""
     OmegaConf.register_new_resolver("divide", lambda a, b: max(1, int(a) // int(b)), replace=True)
     store = ConfigStore.instance()
-    for name, root in (("train", TrainConfig), ("render", RenderConfig), ("evaluate", EvaluateConfig)):
+    for name, root in (
+        ("train", TrainConfig),
+        ("render", RenderConfig),
+        ("inspect", InspectConfig),
+        ("evaluate", EvaluateConfig),
+    ):
         store.store(name=f"base_{name}", node=root)
     for group, schema in (
         ("rig", ToedInRigConfig),
         ("placement", PlacementConfig),
         ("lights", LightsConfig),
         ("material", MaterialConfig),
+        ("texture", TextureConfig),
         ("background", BackgroundConfig),
+        ("sensor", SensorConfig),
         ("categories", CategoriesConfig),
         ("scale", ScaleConfig),
         ("paths", PathsConfig),

@@ -28,7 +28,7 @@ from stereo_occ.task import KEY, OccupancyTask
 
 logger = logging.getLogger(__name__)
 
-GROUPS = ("data", "rig", "placement", "lights", "material", "background", "categories")
+GROUPS = ("data", "rig", "placement", "lights", "material", "texture", "background", "sensor", "categories")
 
 
 def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
@@ -45,6 +45,8 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     trained = training_config(checkpoint[KEY]["config"])
     task = build_task(trained, load_weights=False)
     load_weights(task, checkpoint["state_dict"], settings.checkpoint)
+    if settings.subset == "auto":
+        settings.subset = "all" if _other_meshes(cfg, trained) else "test"
     data = build_data(cfg, settings, trained)
     folder.mkdir(parents=True, exist_ok=True)
     trainer = lightning.Trainer(
@@ -73,6 +75,12 @@ def own_settings(cfg: DictConfig) -> EvaluateConfig:
     settings = OmegaConf.to_object(own)
     assert isinstance(settings, EvaluateConfig)
     return settings
+
+
+def _other_meshes(cfg: DictConfig, trained: DictConfig) -> bool:
+    """Whether the objects asked for are meshes that the checkpoint cannot have been trained on."""
+    asked, own = (OmegaConf.select(config, "data.root") for config in (cfg, trained))
+    return asked is not None and (own is None or Path(asked).resolve() != Path(own).resolve())
 
 
 def load_weights(task: OccupancyTask, state_dict: dict[str, Any], path: str) -> None:
@@ -113,6 +121,7 @@ def build_data(cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig) -
         evaluation_batch_size=settings.batch_size,
         workers=settings.trainer.workers,
         progress=settings.progress,
+        only=settings.subset,
     )
 
 

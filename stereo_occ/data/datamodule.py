@@ -5,13 +5,17 @@ from typing import Any
 import lightning
 from torch.utils.data import DataLoader
 
-from stereo_occ.config import PairsConfig, QueriesConfig, SplitKind
+from stereo_occ.config import PairsConfig, QueriesConfig
 from stereo_occ.data.batch import Batch
+from stereo_occ.data.config import SplitKind
 from stereo_occ.data.dataset import EvaluationPairs, ShuffledBatches, TrainingPairs
+from stereo_occ.data.objects import members
 from stereo_occ.data.prepare import PreparedShards, prepare
 from stereo_occ.data.shard import Shard
-from stereo_occ.data.splits import SUBSETS, split_objects, split_views
+from stereo_occ.data.splits import SUBSETS, split_views
 from stereo_occ.errors import UserError
+
+NO_OBJECTS = "no object is in {}; change data.fractions, or the lists that the data set comes with"
 
 
 class PairsDataModule(lightning.LightningDataModule):
@@ -20,6 +24,7 @@ class PairsDataModule(lightning.LightningDataModule):
     Args:
         evaluation_views: poses per object in validation and test.
         evaluation_points: query points per pose and metric.
+        only: the one subset that will be asked for, so that no other is rendered.
     """
 
     def __init__(
@@ -30,6 +35,7 @@ class PairsDataModule(lightning.LightningDataModule):
         evaluation_batch_size: int,
         workers: int = 0,
         progress: bool = True,
+        only: str = "all",
     ) -> None:
         super().__init__()
         self.pairs = pairs
@@ -38,6 +44,7 @@ class PairsDataModule(lightning.LightningDataModule):
         self.evaluation_batch_size = evaluation_batch_size
         self.workers = workers
         self.progress = progress
+        self.only = only
         self.prepared: PreparedShards | None = None
         self._training: dict[str, Any] = {}
 
@@ -55,29 +62,31 @@ class PairsDataModule(lightning.LightningDataModule):
 
     def prepare_data(self) -> None:
         """Render the missing shards."""
-        self.prepared = prepare(self.pairs, self.progress)
+        self.prepared = prepare(self.pairs, self.progress, self.only)
 
     def subset(self, name: str) -> tuple[list[Shard], list[int]]:
         """The shards of ``train``, ``val``, ``test`` or ``all``, and which views of each belong to it."""
+        if name not in (*SUBSETS, "all"):
+            raise UserError(f"subset={name}: must be one of {', '.join([*SUBSETS, 'all'])}")
+        if self.only not in ("all", name):
+            raise RuntimeError(f"made for subset {self.only} alone, asked for {name}")
         if self.prepared is None:
             self.prepare_data()
         assert self.prepared is not None
-        data, shards = self.pairs.data, dict(zip(self.prepared.objects, self.prepared.paths, strict=True))
-        if name == "all":
-            return [Shard(path) for path in shards.values()], list(range(data.views))
-        if name not in SUBSETS:
-            raise UserError(f"subset={name}: must be one of {', '.join([*SUBSETS, 'all'])}")
-        if data.split is SplitKind.view:
-            return [Shard(path) for path in shards.values()], list(
-                split_views(data.views, data.fractions, name)
-            )
-        split = split_objects(self.prepared.objects, data.fractions, data.seed)
-        return [Shard(shards[key]) for key in split[name]], list(range(data.views))
+        data, sources = self.pairs.data, self.prepared.sources
+        paths = dict(zip((source.key for source in sources), self.prepared.paths, strict=True))
+        views = range(data.views)
+        if data.split is SplitKind.view and name != "all":
+            views = split_views(data.views, data.fractions, name)
+        chosen = sources if name == self.only else members(sources, self.pairs, name)
+        return [Shard(paths[source.key]) for source in chosen], list(views)
 
     def train_dataloader(self) -> DataLoader[Batch]:
         """Shuffled batches from the trainer's current step on."""
         settings = self._training
         shards, views = self.subset("train")
+        if not shards:
+            raise UserError(f"data.name={self.pairs.data.name}: {NO_OBJECTS.format('train')}")
         dataset = TrainingPairs(shards, views, settings["queries"], settings["points"], settings["seed"])
         first_step = self.trainer.global_step if self.trainer else 0
         batches = ShuffledBatches(
@@ -101,9 +110,7 @@ class PairsDataModule(lightning.LightningDataModule):
         """The first ``evaluation_views`` poses of each object of a subset, with fixed points."""
         shards, views = self.subset(subset)
         if not shards:
-            raise UserError(
-                f"subset={subset}: holds no objects with data.fractions={self.pairs.data.fractions}"
-            )
+            raise UserError(f"data.name={self.pairs.data.name}: {NO_OBJECTS.format(subset)}")
         if len(views) < self.evaluation_views:
             raise UserError(
                 f"views={self.evaluation_views}: there are only {len(views)} of each object in {subset}; ask for fewer"

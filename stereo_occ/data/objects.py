@@ -1,16 +1,20 @@
 """The objects of a data set, before they are built."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from zlib import crc32
 
-from stereo_occ.config import DataConfig, MeshesConfig, ProceduralConfig
+from stereo_occ.config import PairsConfig
+from stereo_occ.data.config import MeshesConfig, MeshFilesConfig, ProceduralConfig, ShapeNetConfig, SplitKind
+from stereo_occ.data.meshes import MeshRecord, inspect_files, without_copies
+from stereo_occ.data.splits import split_objects
 from stereo_occ.errors import UserError
-from stereo_occ.shapes.folder import Skipped, read_folder
+from stereo_occ.shapes.layouts import Listing, Skipped, list_folder, list_table
+from stereo_occ.shapes.mesh_cache import MeshCache
 from stereo_occ.shapes.procedural import procedural_shape
 from stereo_occ.shapes.shape import Shape
+from stereo_occ.shapes.shapenet import list_shapenet
 
 
 @dataclass(frozen=True)
@@ -19,51 +23,105 @@ class ObjectSource:
 
     Attributes:
         version: differs when a file of the same name holds another mesh.
+        subset: that the data set itself puts the object in; empty where it says nothing.
     """
 
     category: str
     object_id: str
     build: Callable[[], Shape]
     version: str = ""
+    subset: str = ""
 
     @property
     def file_name(self) -> str:
         """Of its shard."""
         return f"{self.object_id}{self.version}.h5"
 
+    @property
+    def key(self) -> tuple[str, str]:
+        """Category and id."""
+        return self.category, self.object_id
 
-def list_objects(data: DataConfig, categories: list[str]) -> tuple[list[ObjectSource], list[Skipped]]:
+
+@dataclass(frozen=True)
+class Objects:
+    """What a data set holds.
+
+    Attributes:
+        skipped: files and folders that gave no object.
+        records: of all mesh files, also those that were rejected; empty for generated objects.
+    """
+
+    sources: list[ObjectSource]
+    skipped: list[Skipped] = field(default_factory=list)
+    records: list[MeshRecord] = field(default_factory=list)
+
+
+def list_objects(pairs: PairsConfig, progress: bool) -> Objects:
     """The objects of the asked categories, and the files that are no usable object.
 
+    Meshes are read and repaired, unless they are in the cache under ``paths.data``.
+
     Raises:
-        UserError: the folder is missing or holds no usable object.
+        UserError: the folder is missing or not laid out as it should be.
     """
+    data, categories = pairs.data, pairs.categories.names
     if isinstance(data, ProceduralConfig):
-        return [
-            ObjectSource(
-                category, f"{category}_{index:04d}", partial(procedural_shape, category, data.seed, index)
-            )
-            for category in categories
-            for index in range(data.counts[category])
-        ], []
-    assert isinstance(data, MeshesConfig)
-    shapes, skipped = read_folder(Path(data.root))
-    sources = [
-        ObjectSource(shape.category, shape.object_id, partial(_built, shape), _version(shape))
-        for shape in shapes
-        if shape.category in categories
-    ]
-    if not sources:
-        raise UserError(
-            f"data.root={data.root}: no watertight mesh of {', '.join(categories)} among {len(skipped)} files; "
-            f"the layout is category/name/model.*"
+        return Objects(
+            [
+                ObjectSource(
+                    category, f"{category}_{index:04d}", partial(procedural_shape, category, data.seed, index)
+                )
+                for category in categories
+                for index in range(data.counts[category])
+            ]
         )
-    return sources, skipped
+    assert isinstance(data, MeshFilesConfig)
+    listing = _listing(data)
+    files = [file for file in listing.files if file.category in categories]
+    cache = MeshCache(Path(pairs.paths.data) / "mesh_cache", Path(data.root), data.colors)
+    records = list(without_copies(inspect_files(files, cache, pairs.workers, data.time_limit, progress)))
+    skipped = listing.skipped + [
+        Skipped(record.file.path, record.file.object_id, record.file.category, record.outcome.reason)
+        for record in records
+        if record.outcome.reason
+    ]
+    sources = [
+        ObjectSource(
+            record.file.category,
+            record.file.object_id,
+            record.shape,
+            f"_{record.outcome.checksum}",
+            record.file.subset,
+        )
+        for record in records
+        if not record.outcome.reason
+    ]
+    return Objects(sources, skipped, records)
 
 
-def _built(shape: Shape) -> Shape:
-    return shape
+def members(objects: Sequence[ObjectSource], pairs: PairsConfig, subset: str) -> list[ObjectSource]:
+    """The objects that ``train``, ``val``, ``test`` or ``all`` needs.
+
+    Raises:
+        UserError: there is none at all, or a category has fewer objects than subsets to fill.
+    """
+    if not objects:
+        raise UserError(
+            f"data={pairs.data.name}: no usable object of {', '.join(pairs.categories.names)}; "
+            f"python -m stereo_occ.inspect with the same data says why"
+        )
+    if subset == "all" or pairs.data.split is SplitKind.view:
+        return list(objects)
+    by_key = {source.key: source for source in objects}
+    given = {source.key: source.subset for source in objects if source.subset}
+    division = split_objects(list(by_key), pairs.data.fractions, pairs.data.seed, given)
+    return [by_key[key] for key in division[subset]]
 
 
-def _version(shape: Shape) -> str:
-    return f"_{crc32(shape.mesh.vertices.tobytes() + shape.mesh.faces.tobytes()):08x}"
+def _listing(data: MeshFilesConfig) -> Listing:
+    root = Path(data.root)
+    if isinstance(data, ShapeNetConfig):
+        return list_shapenet(root)
+    assert isinstance(data, MeshesConfig)
+    return list_folder(root) if data.table is None else list_table(root, Path(data.table))

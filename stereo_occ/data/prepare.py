@@ -17,7 +17,9 @@ import numpy as np
 from tqdm import tqdm
 
 from stereo_occ.config import PairsConfig
-from stereo_occ.data.objects import ObjectSource, list_objects
+from stereo_occ.data.config import NOT_CONTENT
+from stereo_occ.data.meshes import MeshRecord
+from stereo_occ.data.objects import ObjectSource, list_objects, members
 from stereo_occ.data.pairs import POINTS_STREAM, render_views
 from stereo_occ.data.processes import start_worker
 from stereo_occ.data.rigs import ToedInRigConfig
@@ -25,29 +27,37 @@ from stereo_occ.data.shard import VERSION, remove_partial, write_shard
 from stereo_occ.errors import UserError
 from stereo_occ.occupancy.pools import box_pool, surface_pool
 from stereo_occ.render.stereo import StereoRenderer
-from stereo_occ.shapes.folder import Skipped
+from stereo_occ.shapes.layouts import Skipped
 
 
 @dataclass(frozen=True)
 class PreparedShards:
-    """Shards on disk: ``paths[i]`` holds ``objects[i]``; ``skipped`` are files that are no usable object."""
+    """Shards on disk: ``paths[i]`` holds ``sources[i]``.
+
+    ``skipped`` are files that are no usable object, ``records`` what became of all mesh files of the data set.
+    """
 
     folder: Path
-    objects: list[tuple[str, str]]
+    sources: list[ObjectSource]
     paths: list[Path]
     skipped: list[Skipped]
+    records: list[MeshRecord]
 
 
-def prepare(pairs: PairsConfig, progress: bool) -> PreparedShards:
+def prepare(pairs: PairsConfig, progress: bool, subset: str = "all") -> PreparedShards:
     """Make sure that every shard of ``pairs`` exists; render the missing ones with a progress bar.
 
     A shard's content depends on the configuration and the object alone: not on the number of processes, nor on which
     other objects are asked for, nor on interruptions.
 
+    Args:
+        subset: ``train``, ``val`` or ``test`` for the shards of that subset alone.
+
     Raises:
         UserError: from the objects, the renderer or the disk.
     """
-    sources, skipped = list_objects(pairs.data, pairs.categories.names)
+    objects = list_objects(pairs, progress)
+    sources = members(objects.sources, pairs, subset)
     folder = Path(pairs.paths.data) / _folder_name(pairs)
     paths = [folder / source.category / source.file_name for source in sources]
     missing = [(source, path) for source, path in zip(sources, paths, strict=True) if not path.exists()]
@@ -65,7 +75,7 @@ def prepare(pairs: PairsConfig, progress: bool) -> PreparedShards:
         with bar:
             for _ in _render_all(missing, pairs, workers):
                 bar.update(pairs.data.views)
-    return PreparedShards(folder, [(s.category, s.object_id) for s in sources], paths, skipped)
+    return PreparedShards(folder, sources, paths, objects.skipped, objects.records)
 
 
 def render_object(source: ObjectSource, path: Path, pairs: PairsConfig) -> None:
@@ -119,8 +129,8 @@ def _folder_name(pairs: PairsConfig) -> str:
 
 def _description(pairs: PairsConfig) -> dict[str, object]:
     data = asdict(pairs.data)
-    for division in ("counts", "split", "fractions"):
-        data.pop(division, None)
+    for key in NOT_CONTENT:
+        data.pop(key, None)
     if "root" in data:
         data["root"] = str(Path(data["root"]).resolve())
     parts = {
@@ -129,6 +139,9 @@ def _description(pairs: PairsConfig) -> dict[str, object]:
     }
     if parts["rig"]["kind"] == ToedInRigConfig.kind:
         del parts["rig"]["kind"]
+    if not parts["background"]["masked"]:
+        del parts["background"]["masked"]
+    parts |= {name: asdict(group) for name in ("texture", "sensor") if not (group := getattr(pairs, name)).off}
     return _plain({"shard_version": VERSION, "data": data, **parts})  # type: ignore[return-value]
 
 

@@ -117,7 +117,7 @@ def load(entry: Path, header_only: bool = False) -> Inspection:
     Raises:
         Exception: one of :data:`DAMAGED` if there is none or it is damaged.
     """
-    with np.load(entry) as arrays:
+    with entry.open("rb") as file, np.load(file) as arrays:
         header = json.loads(arrays["header"].tobytes())
         mesh = None
         if "vertices" in arrays and not header_only:
@@ -130,7 +130,7 @@ def load(entry: Path, header_only: bool = False) -> Inspection:
 def _code() -> str:
     """What a result depends on besides the file: the code of reading and repair, and the libraries they rest on."""
     here = Path(__file__).parent
-    modules = ("reading.py", "surface_colors.py", "inspection.py", "repair/*.py")
+    modules = ("reading.py", "surface_colors.py", "inspection.py", "quality.py", "repair/*.py")
     parts = [path.read_bytes() for name in modules for path in sorted(here.glob(name))]
     libraries = [version(name) for name in ("trimesh", "manifold3d", "numpy", "scipy")]
     return digest(b"".join([*parts, str(libraries + sorted(trimesh.available_formats())).encode()]))

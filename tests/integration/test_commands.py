@@ -8,11 +8,11 @@ import pytest
 import torch
 
 import stereo_occ
-from stereo_occ.checks import check_evaluation, check_pairs, check_training
+from stereo_occ.checks import check_evaluation, check_pairs, check_rendering, check_training
 from stereo_occ.problems import find_problems
 
 CHECKOUT = Path(stereo_occ.__file__).parents[1]
-CHECKS = {"train": check_training, "evaluate": check_evaluation, "render": check_pairs}
+CHECKS = {"train": check_training, "evaluate": check_evaluation, "render": check_rendering, "inspect": check_pairs}
 
 
 def code_lines(text):

@@ -9,7 +9,7 @@ import yaml
 from omegaconf import OmegaConf
 
 from stereo_occ.checkpoint import plain
-from stereo_occ.checks import check_evaluation, check_pairs, check_training
+from stereo_occ.checks import check_evaluation, check_pairs, check_rendering, check_training
 from stereo_occ.cli import compose_config
 from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
@@ -55,12 +55,13 @@ def needed(tmp_path, monkeypatch):
     (tmp_path / "best.ckpt").touch()
     return {
         "data=meshes": [f"data.root={tmp_path}"],
+        "data=shapenet": [f"data.root={tmp_path}"],
         "evaluate": [f"checkpoint={tmp_path / 'best.ckpt'}"],
     }
 
 
 def problems(program, overrides):
-    check = {"train": check_training, "render": check_pairs, "evaluate": check_evaluation}[program]
+    check = {"train": check_training, "render": check_rendering, "evaluate": check_evaluation}[program]
     return find_problems(program, overrides, check)
 
 
@@ -177,3 +178,13 @@ def test_experiments_change_no_more_than_they_say():
     plain_run, overfit = compose_config("train"), compose_config("train", ["experiment=overfit"])
     changed = {key for key in plain(plain_run) if plain(plain_run)[key] != plain(overfit)[key]}
     assert changed == {"scale", "data", "validation"}
+
+
+def test_inspecting_needs_only_the_folder(tmp_path):
+    root = f"data.root={tmp_path}"
+    assert find_problems("inspect", [root], check_pairs) == []
+    assert find_problems("inspect", ["data=shapenet", root], check_pairs) == []
+    assert find_problems("inspect", [], check_pairs) == ["data.root: no value given; add data.root=..."]
+    assert find_problems("inspect", [root, "data.time_limit=0"], check_pairs) == [
+        "data.time_limit=0.0: must be above 0 seconds"
+    ]
