@@ -48,9 +48,7 @@ class MeshesConfig(MeshFilesConfig):
     """A folder of meshes, laid out by category or listed in a table."""
 
     name: str = "meshes"
-    table: str | None = (
-        None  # CSV file with columns file and category; null: category/name/model.* or category/name.*
-    )
+    table: str | None = None  # CSV file with columns file and category; null: folders named after categories
 
 
 @dataclass
