@@ -1,17 +1,38 @@
-"""Milliseconds per training step at scale=laptop, forward, backward and optimiser, models and precisions in turn."""
+"""Milliseconds per training step at scale=laptop, reading included: ours in fp32 and bf16 beside a plain reference.
+
+    python -m benchmarks.training_step --threads 2
+
+Every way runs in a process of its own; the processes take turns, one step each, so that whatever else the machine does
+hits them alike. Ours reads shards and trains as ``stereo_occ.train`` does; the reference is ``reference_step``.
+"""
 
 import argparse
+import json
+import multiprocessing
+import resource
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import cycle
+from multiprocessing.connection import Connection
+from pathlib import Path
 
 import numpy as np
 import torch
+from omegaconf import DictConfig, OmegaConf
 from torch.nn.functional import binary_cross_entropy_with_logits
+from tqdm import tqdm
 
+from benchmarks.reference_step import ConvONet, export_npz, npz_batches
 from stereo_occ.checkpoint import build_task
 from stereo_occ.cli import compose_config
-from stereo_occ.geometry.camera import toed_in_rig
-from stereo_occ.models.base import StereoViews
+from stereo_occ.config import TrainConfig
+from stereo_occ.data.batch import Batch
+from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.memory import keep_freed_memory
+from stereo_occ.shapes.shape import CATEGORIES
+from stereo_occ.train import build_data
 
 MODELS = {
     "stereo": ["model=stereo"],
@@ -19,63 +40,122 @@ MODELS = {
     "pixel_stereo": ["model=pixel_stereo"],
     "plane_sweep_stereo": ["model=plane_sweep_stereo"],
 }
+WAYS = ("reference", "fp32", "bf16")
+WARM_UP = 4  # steps
+STEPS = 40_000  # of the paper's schedule
 
 
-def training_step(overrides: list[str], precision: torch.dtype) -> Callable[[], None]:
-    """A step on one random batch of the scale's size."""
-    cfg = compose_config("train", overrides)
-    task = build_task(cfg).train()
-    optimizer = task.configure_optimizers()["optimizer"]
-    batch, points, side = cfg.batch_size, cfg.points, cfg.data.image_side
-    rig = toed_in_rig(1.0, np.pi / 16, np.pi / 3, side)
-    K_233, camera_from_rig_244 = (
-        torch.tensor(np.stack([getattr(camera, name) for camera in rig.cameras]), dtype=torch.float32)
-        for name in ("K", "camera_from_rig")
-    )
-    views = StereoViews(
-        torch.rand(batch, 3, side, side),
-        torch.rand(batch, 3, side, side),
-        K_233.expand(batch, -1, -1, -1),
-        camera_from_rig_244.expand(batch, -1, -1, -1),
-    )
-    points_BN3 = torch.rand(batch, points, 3) - 0.5
-    occupied_BN = (torch.rand(batch, points) > 0.7).float()
+@dataclass(frozen=True)
+class Task:
+    """What one process does."""
 
-    def step() -> None:
-        with torch.autocast("cpu", precision, enabled=precision is not torch.float32):
-            logits_BN = task.model(views, points_BN3).float()
-        binary_cross_entropy_with_logits(logits_BN, occupied_BN).backward()
+    overrides: list[str]
+    way: str
+    threads: int
+    npz: Path
+
+
+def serve(task: Task, pipe: Connection) -> None:
+    """Do one step and send its milliseconds whenever asked; at last the peak of memory, MB."""
+    torch.set_num_threads(task.threads)
+    if task.way != "reference":
+        keep_freed_memory()
+    steps = training_steps(task)
+    while pipe.recv():
+        start = time.perf_counter()
+        next(steps)
+        pipe.send(1000 * (time.perf_counter() - start))
+    pipe.send(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+
+
+def training_steps(task: Task) -> Iterator[None]:
+    """Training, one step at a time."""
+    cfg = compose_config("train", task.overrides)
+    lightning_task = build_task(cfg).train()
+    model = lightning_task.model
+    optimizer = lightning_task.configure_optimizers()["optimizer"]  # type: ignore[index, call-overload]
+    batches: Iterator[Batch] = cycle(our_data(cfg).train_dataloader())
+    if task.way == "reference":
+        batches = npz_batches(task.npz, cfg.batch_size, cfg.points)
+        if hasattr(model, "decoder") and "decoder" in cfg.model:
+            decoder = cfg.model.decoder
+            model.decoder = ConvONet(cfg.model.code_size, hidden=decoder.hidden, blocks=decoder.blocks)
+        optimizer = torch.optim.Adam(model.parameters(), lr=cfg.optimizer.lr)
+    for batch in batches:
+        queries = batch.queries["train"]
+        with torch.autocast("cpu", torch.bfloat16, enabled=task.way == "bf16"):
+            logits_BN = model(batch.views, queries.points_BN3).float()
+        binary_cross_entropy_with_logits(logits_BN, queries.occupied_BN).backward()
         optimizer.step()
         optimizer.zero_grad()
+        yield
 
-    return step
+
+def our_data(cfg: DictConfig) -> PairsDataModule:
+    """The data module of a configuration."""
+    typed = OmegaConf.to_object(cfg)
+    assert isinstance(typed, TrainConfig)
+    return build_data(typed)
+
+
+def measure(tasks: list[Task], steps: int, label: str) -> list[tuple[float, float]]:
+    """Median milliseconds and peak MB of each task, with the steps of all in turn."""
+    context = multiprocessing.get_context("spawn")
+    pipes, processes = [], []
+    for task in tasks:
+        ours, theirs = context.Pipe()
+        process = context.Process(target=serve, args=(task, theirs), daemon=True)
+        process.start()
+        pipes.append(ours)
+        processes.append(process)
+    times = np.zeros((steps + WARM_UP, len(tasks)))
+    for row in tqdm(times, desc=label, disable=None):
+        for column, pipe in enumerate(pipes):
+            pipe.send(True)
+            row[column] = pipe.recv()
+    peaks = []
+    for pipe, process in zip(pipes, processes, strict=True):
+        pipe.send(False)
+        peaks.append(float(pipe.recv()))
+        process.join()
+    return list(zip(np.median(times[WARM_UP:], axis=0).tolist(), peaks, strict=True))
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--steps", type=int, default=20)
-    parser.add_argument("--threads", type=int, default=1)
-    options = parser.parse_args()
-    torch.set_num_threads(options.threads)
-    ways = {
-        (name, precision): training_step(overrides, precision)
-        for name, overrides in MODELS.items()
-        for precision in (torch.float32, torch.bfloat16)
-    }
-    seconds: dict[tuple[str, torch.dtype], list[float]] = {way: [] for way in ways}
-    for _ in range(options.steps + 3):
-        for way, step in ways.items():
-            start = time.perf_counter()
-            step()
-            seconds[way].append(time.perf_counter() - start)
-    print(
-        f"{'model':<20} {'fp32 ms':>8} {'bf16 ms':>8}   ({options.threads} thread(s), median of {options.steps})"
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    for name in MODELS:
-        fp32, bf16 = (
-            1000 * float(np.median(seconds[name, kind][3:])) for kind in (torch.float32, torch.bfloat16)
+    parser.add_argument("--steps", type=int, default=30)
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
+    parser.add_argument("--output", type=Path, help="JSON file for the figures")
+    options = parser.parse_args()
+    figures = {}
+    with tempfile.TemporaryDirectory() as folder:
+        common = [
+            "scale=laptop",
+            "data.views=10",
+            *(f"data.counts.{category}=5" for category in CATEGORIES),
+            f"paths.data={folder}",
+        ]
+        data = our_data(compose_config("train", common))
+        export_npz(data.subset("train")[0], Path(folder) / "npz")
+        print(
+            f"{'model':<20} {'reference':>9} {'fp32':>5} {'bf16':>5}  ms   "
+            f"{'fp32':>5} {'bf16':>5} times   MB        40,000 steps in bf16"
         )
-        print(f"{name:<20} {fp32:>8.0f} {bf16:>8.0f}")
+        for name in options.models:
+            tasks = [Task(MODELS[name] + common, way, options.threads, Path(folder) / "npz") for way in WAYS]
+            (reference, most), (fp32, _), (bf16, least) = measure(tasks, options.steps, name)
+            print(
+                f"{name:<20} {reference:>9.0f} {fp32:>5.0f} {bf16:>5.0f}      "
+                f"{reference / fp32:>5.1f} {reference / bf16:>5.1f}         {most:.0f} to {least:.0f}  "
+                f"{STEPS * bf16 / 60_000:>5.0f} min",
+                flush=True,
+            )
+            figures[name] = {"reference_ms": reference, "fp32_ms": fp32, "bf16_ms": bf16}
+    if options.output:
+        options.output.write_text(json.dumps({"threads": options.threads, **figures}, indent=2) + "\n")
 
 
 if __name__ == "__main__":
