@@ -1,12 +1,17 @@
 """Entry points: Hydra with every problem reported at once, one line each, before work starts."""
 
 import functools
+import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from importlib.util import find_spec
 from pathlib import Path
 
 import hydra
 from hydra._internal.utils import get_args_parser
+from hydra.core.hydra_config import HydraConfig
+from hydra.types import RunMode
 from omegaconf import DictConfig
 
 from stereo_occ.config import register_schemas
@@ -17,6 +22,12 @@ from stereo_occ.problems import Check, find_problems
 # With these Hydra shows something and runs no job.
 ONLY_SHOWS = ("help", "hydra_help", "cfg", "info", "shell_completion")
 
+#: Launchers of ``conf/hydra/launcher`` and what they need.
+LAUNCHERS = {
+    "joblib": "hydra_plugins.hydra_joblib_launcher",
+    "submitit_slurm": "hydra_plugins.hydra_submitit_launcher",
+}
+
 
 def entry_point(
     config_name: str, check: Check
@@ -24,7 +35,8 @@ def entry_point(
     """Turn ``task(cfg)`` into a command line program configured by ``conf/<config_name>.yaml``.
 
     Every problem of the configuration ends the program before it starts, with one line each on standard error and
-    exit code 2. So does a :class:`UserError` of the task; of a sweep the other jobs still run.
+    exit code 2. So does a :class:`UserError` of the task; of a sweep the other jobs still run, in this process or where
+    a launcher runs them.
     """
 
     def decorate(task: Callable[[DictConfig], None]) -> Callable[[], None]:
@@ -32,9 +44,12 @@ def entry_point(
 
         @functools.wraps(task)
         def guarded(cfg: DictConfig) -> None:
+            register_schemas()  # a launcher's process does not know them yet
             try:
                 task(cfg)
             except UserError as error:
+                if _runs_elsewhere():
+                    raise  # Hydra brings it back to the process of the sweep
                 failures.append(str(error))
                 _report([str(error)])
 
@@ -46,7 +61,7 @@ def entry_point(
         def main() -> None:
             arguments = get_args_parser().parse_args()
             if not any(getattr(arguments, name) for name in ONLY_SHOWS):
-                problems = find_problems(
+                problems = _missing_launchers(arguments.overrides) or find_problems(
                     arguments.config_name or config_name,
                     arguments.overrides,
                     check,
@@ -56,7 +71,12 @@ def entry_point(
                 if problems:
                     _report(problems)
                     raise SystemExit(2)
-            run_hydra()
+            try:
+                with _errors_raised() if arguments.multirun else nullcontext():
+                    run_hydra()
+            except UserError as error:
+                failures.append(str(error))
+                _report([str(error)])
             if failures:
                 raise SystemExit(2)
 
@@ -77,6 +97,34 @@ def compose_config(config_name: str, overrides: Sequence[str] = ()) -> DictConfi
     if problems:
         raise UserError("; ".join(problems))
     return composed[0]
+
+
+def _runs_elsewhere() -> bool:
+    hydra_cfg = HydraConfig.get()
+    return hydra_cfg.mode is RunMode.MULTIRUN and not hydra_cfg.launcher._target_.endswith(".BasicLauncher")
+
+
+def _missing_launchers(overrides: Sequence[str]) -> list[str]:
+    return [
+        f"{override}: needs the extra cluster; pip install 'stereo-occ[cluster]'"
+        for override in overrides
+        for name, package in LAUNCHERS.items()
+        if override == f"hydra/launcher={name}" and find_spec(package) is None
+    ]
+
+
+@contextmanager
+def _errors_raised() -> Iterator[None]:
+    """Let Hydra raise what went wrong in a sweep, where it would print it and exit."""
+    before = os.environ.get("HYDRA_FULL_ERROR")
+    os.environ["HYDRA_FULL_ERROR"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["HYDRA_FULL_ERROR"]
+        else:
+            os.environ["HYDRA_FULL_ERROR"] = before
 
 
 def _report(problems: Sequence[str]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from samples import single_line
 
-from stereo_occ import evaluate, train
+from stereo_occ import cli, evaluate, train
 from stereo_occ.cli import compose_config
 from stereo_occ.errors import UserError
 from stereo_occ.problems import find_problems, nearest
@@ -199,6 +199,34 @@ def test_a_failure_in_a_sweep_is_one_line_and_the_other_jobs_run(tmp_path):
     assert [line for line in run.stdout.splitlines() if line.startswith("ran")] == ["ran 0", "ran 2"]
     folders = sorted(path.name for path in Path(tmp_path).glob("outputs/sweeps/*/*") if path.is_dir())
     assert folders == ["0_stereo_seed0", "1_stereo_seed1", "2_stereo_seed2"]
+
+
+def test_a_failure_in_another_process_of_a_sweep_ends_it_with_its_line(tmp_path):
+    pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
+    (tmp_path / "program.py").write_text(PROGRAM)
+    run = subprocess.run(
+        [sys.executable, "program.py", "-m", "hydra/launcher=joblib", "seed=0,1,2"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert run.returncode == 2, run.stderr
+    assert run.stderr.splitlines()[-1] == "stereo_occ: seed=1: an unlucky number; choose another"
+    assert "Traceback" not in run.stderr
+    assert sorted(line for line in run.stdout.splitlines() if line.startswith("ran")) == ["ran 0", "ran 2"]
+
+
+def test_a_launcher_that_is_not_installed_is_one_line(monkeypatch, capsys):
+    monkeypatch.setitem(cli.LAUNCHERS, "joblib", "no_such_package")
+    monkeypatch.setattr(sys, "argv", ["train", "-m", "hydra/launcher=joblib", "seed=0,1"])
+    with pytest.raises(SystemExit) as stop:
+        train.main()
+    assert stop.value.code == 2
+    assert capsys.readouterr().err == (
+        "stereo_occ: hydra/launcher=joblib: needs the extra cluster; pip install 'stereo-occ[cluster]'\n"
+    )
 
 
 def test_run_folders_can_be_typed_without_quotes():
