@@ -12,7 +12,15 @@ from torch import nn
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import StereoRig
 from stereo_occ.models.base import OccupancyModel
-from stereo_occ.models.cost_volumes import Concat, Correlation, CostVolume, Groupwise, calibrated, one_sided
+from stereo_occ.models.cost_volumes import (
+    Concat,
+    Correlation,
+    CostVolume,
+    Groupwise,
+    PlaneSweep,
+    calibrated,
+    one_sided,
+)
 from stereo_occ.models.decoders import ONet
 from stereo_occ.models.encoders import DilatedResNet, ImageEncoder, ResNet18
 from stereo_occ.models.light import LightEncoder
@@ -36,6 +44,7 @@ COST_VOLUMES: dict[str, Callable[..., CostVolume]] = {
     "correlation_signed": Correlation,
     "groupwise": Groupwise,
     "concat": Concat,
+    "plane_sweep": PlaneSweep,
 }
 DECODERS: dict[str, Callable[..., ONet]] = {"onet": ONet}
 
@@ -73,7 +82,9 @@ def _stereo(config: Config, rig: StereoRig, load_weights: bool) -> StereoModel:
     volume_config = dict(config["cost_volume"])
     count = volume_config.pop("disparities", None)
     disparities = calibrated(rig, encoder.stride) if count is None else one_sided(count)
-    cost_volume = _part(COST_VOLUMES, volume_config, "model.cost_volume", encoder.channels, disparities)
+    cost_volume = _part(
+        COST_VOLUMES, volume_config, "model.cost_volume", encoder.channels, disparities=disparities
+    )
     decoder = _part(DECODERS, config["decoder"], "model.decoder", config["code_size"])
     return StereoModel(encoder, cost_volume, decoder, width=config["width"], code_size=config["code_size"])
 

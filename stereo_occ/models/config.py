@@ -94,6 +94,14 @@ class ConcatConfig(CostVolumeConfig):
 
 
 @dataclass
+class PlaneSweepConfig(CostVolumeConfig):
+    """Channel-wise products on planes of depth, with the cameras given."""
+
+    name: str = "plane_sweep"
+    planes: int = MISSING
+
+
+@dataclass
 class DecoderConfig:
     """An occupancy decoder."""
 
@@ -161,7 +169,13 @@ class PlaneSweepStereoConfig(PixelStereoConfig):
 SCHEMAS: dict[str, tuple[type, ...]] = {
     "model": (StereoConfig, MonoConfig, PixelStereoConfig, PlaneSweepStereoConfig),
     "model/encoder": (DilatedResNetConfig, ResNet18Config, LightConfig, TimmConfig),
-    "model/cost_volume": (CorrelationConfig, SignedCorrelationConfig, GroupwiseConfig, ConcatConfig),
+    "model/cost_volume": (
+        CorrelationConfig,
+        SignedCorrelationConfig,
+        GroupwiseConfig,
+        ConcatConfig,
+        PlaneSweepConfig,
+    ),
     "model/decoder": (ONetConfig,),
 }
 

@@ -81,6 +81,13 @@ def sample_volume(volume_BCDHW: Tensor, points_BN3: Tensor) -> Tensor:
     return samples_BCN11.flatten(2).to(volume_BCDHW.dtype)
 
 
+def cell_pixels(height: int, width: int, stride: int, device: torch.device) -> Tensor:
+    """Homogeneous pixels ``(height * width, 3)`` of the centres of a map's cells, row by row."""
+    u, v = (stride * torch.arange(n, device=device) + (stride - 1) / 2 for n in (width, height))
+    v_HW, u_HW = torch.meshgrid(v, u, indexing="ij")
+    return torch.stack([u_HW, v_HW, torch.ones_like(u_HW)], dim=-1).view(-1, 3)
+
+
 def ray_maps(K_VB33: Tensor, camera_from_rig_VB44: Tensor, height: int, width: int, stride: int) -> Tensor:
     """Pluecker coordinates ``(V, B, 6, height, width)`` of the lines of sight through a map's cells.
 
@@ -93,9 +100,7 @@ def ray_maps(K_VB33: Tensor, camera_from_rig_VB44: Tensor, height: int, width: i
     """
     device = K_VB33.device
     with torch.autocast(device.type, enabled=False):
-        u, v = (stride * torch.arange(n, device=device) + (stride - 1) / 2 for n in (width, height))
-        v_HW, u_HW = torch.meshgrid(v, u, indexing="ij")
-        pixels_P3 = torch.stack([u_HW, v_HW, torch.ones_like(u_HW)], dim=-1).view(-1, 3)
+        pixels_P3 = cell_pixels(height, width, stride, device)
         R_VB33, t_VB3 = camera_from_rig_VB44[..., :3, :3].float(), camera_from_rig_VB44[..., :3, 3].float()
         directions_VBP3 = pixels_P3 @ torch.linalg.inv(K_VB33.float()).mT @ R_VB33
         directions_VBP3 = normalize(directions_VBP3, dim=-1)

@@ -22,15 +22,15 @@ class VolumeSummary(nn.Module):
     The first two parts are those of Shankar et al. (2022), whose blocks end with one channel per disparity.
 
     Args:
-        channels, disparities: of the volume.
+        channels, slices: of the volume.
         width: channels of the last two blocks; the first has four and the second two times as many.
         code_size: channels of the code.
     """
 
-    def __init__(self, channels: int, disparities: int, width: int, code_size: int) -> None:
+    def __init__(self, channels: int, slices: int, width: int, code_size: int) -> None:
         super().__init__()
         self.volume = nn.Sequential(_conv3d(channels, 8), _conv3d(8, 4))
-        widths = (4 * disparities, 4 * width, 2 * width, width, width)
+        widths = (4 * slices, 4 * width, 2 * width, width, width)
         self.blocks = nn.Sequential(
             *(
                 ResidualBlock(in_width, out_width, dilation, LEAKY)
@@ -43,14 +43,17 @@ class VolumeSummary(nn.Module):
 
     def forward(self, volume_BGDHW: Tensor) -> Tensor:
         """Codes ``(B, code_size)``."""
-        x_BCHW = self.volume(volume_BGDHW).flatten(1, 2)  # 4 D channels
+        x_BCHW = self.volume(volume_BGDHW).flatten(1, 2)
         x_BCHW = self.reduce(self.blocks(x_BCHW))  # 256 channels at 1/8 of the volume's resolution
         code_BC: Tensor = self.code(x_BCHW.mean(dim=(2, 3)))
         return code_BC
 
 
 class StereoModel(OccupancyModel):
-    """Shared encoder, cost volume, summary, decoder (section 3.1 of the paper); ignores the cameras."""
+    """Shared encoder, cost volume, summary, decoder (section 3.1 of the paper).
+
+    Of the cost volumes the plane sweep alone looks at the cameras.
+    """
 
     def __init__(
         self, encoder: ImageEncoder, cost_volume: CostVolume, decoder: ONet, *, width: int, code_size: int
@@ -58,13 +61,13 @@ class StereoModel(OccupancyModel):
         super().__init__()
         self.encoder = encoder
         self.cost_volume = cost_volume
-        self.summary = VolumeSummary(cost_volume.out_channels, len(cost_volume.disparities), width, code_size)
+        self.summary = VolumeSummary(cost_volume.out_channels, cost_volume.slices, width, code_size)
         self.decoder = decoder
 
     def encode(self, views: StereoViews) -> Tensor:
         """Codes ``(B, code_size)``."""
         left_BCHW, right_BCHW = self.encoder(torch.cat([views.left_BCHW, views.right_BCHW])).chunk(2)
-        code_BC: Tensor = self.summary(self.cost_volume(left_BCHW, right_BCHW))
+        code_BC: Tensor = self.summary(self.cost_volume(left_BCHW, right_BCHW, views))
         return code_BC
 
     def decode(self, code: Tensor, points_BN3: Tensor) -> Tensor:

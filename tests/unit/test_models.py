@@ -77,6 +77,7 @@ def leave_zero(model):
         (["model/cost_volume=correlation_signed"], "laptop", 64, 4_971_921),
         (["model/cost_volume=groupwise"], "laptop", 64, 4_967_881),
         (["model/cost_volume=concat"], "laptop", 64, 4_973_065),
+        (["model/cost_volume=plane_sweep"], "laptop", 64, 4_969_609),
         (["model/encoder=resnet18", SCRATCH], "laptop", 64, 2_316_089),
         (["model=mono", "model/encoder=dilated_resnet"], "laptop", 64, 4_492_769),
         (["model=pixel_stereo"], "laptop", 64, 1_203_217),
@@ -133,8 +134,8 @@ def test_stereo_encodes_left_and_right_with_the_same_weights_but_different_parts
     with torch.no_grad():
         codes = model.encode(views), model.encode(swapped)
         left, right = model.encoder(views.left_BCHW), model.encoder(views.right_BCHW)
-    torch.testing.assert_close(seen[0], (left, right))
-    torch.testing.assert_close(seen[1], (right, left))
+    torch.testing.assert_close(seen[0][:2], (left, right))
+    torch.testing.assert_close(seen[1][:2], (right, left))
     assert not torch.allclose(*codes)
 
 
