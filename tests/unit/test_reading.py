@@ -1,0 +1,157 @@
+"""Mesh files of every format: the same solid, in the object frame, with its colours and the way back."""
+
+import re
+
+import numpy as np
+import pytest
+import trimesh
+from mesh_files import box, put, shapes_of
+from PIL import Image
+from samples import single_line
+
+from stereo_occ.errors import UserError
+from stereo_occ.shapes.inspection import inspect_mesh
+from stereo_occ.shapes.layouts import list_folder
+from stereo_occ.shapes.reading import read_mesh
+
+FORMATS = ["obj", "ply", "stl", "off", "glb", "gltf", "dae"]
+
+
+def read_folder(root, colors=True):
+    return shapes_of(root, list_folder(root), colors)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_every_format_gives_the_same_solid_in_the_object_frame(tmp_path, suffix):
+    put(box(3, 4, 12).apply_translation([5, 6, 7]), tmp_path, f"bottle/carton/model.{suffix}")
+    (shape,), rejected = read_folder(tmp_path)
+    assert rejected == {}
+    assert (shape.category, shape.object_id) == ("bottle", "carton")
+    np.testing.assert_allclose(
+        shape.mesh.bounds, [[-3 / 26, -4 / 26, -12 / 26], [3 / 26, 4 / 26, 12 / 26]], atol=1e-6
+    )
+    assert shape.mesh.volume == pytest.approx(144 / 13**3, rel=1e-5)
+    assert len(shape.mesh.vertices) == 8
+
+
+@pytest.mark.parametrize("place", ["mug/name/model.gltf", "mug/name.gltf"])
+def test_the_way_back_to_the_files_own_frame_is_kept(tmp_path, place):
+    mesh = trimesh.creation.icosphere(subdivisions=1).apply_transform(np.diag([300, 20, 100, 1]))
+    put(mesh.apply_translation([1000, -50, 7]), tmp_path, place)
+    (shape,), _ = read_folder(tmp_path)
+    np.testing.assert_allclose(shape.mesh.bounds.mean(axis=0), 0, atol=1e-12)
+    assert np.linalg.norm(np.ptp(shape.mesh.bounds, axis=0)) == pytest.approx(1)
+    back = shape.mesh.copy().apply_transform(np.array(shape.facts["file_from_object"]))
+    np.testing.assert_allclose(back.bounds, mesh.bounds, rtol=1e-6)
+    assert back.volume == pytest.approx(mesh.volume, rel=1e-5)
+
+
+def test_vertices_split_by_normals_and_texture_coordinates_are_merged(tmp_path):
+    faces = "\n".join(
+        f"f {a}/1/{n} {b}/2/{n} {c}/3/{n}" for n, (a, b, c) in enumerate(box(1, 1, 1).faces + 1, start=1)
+    )
+    vertices = "\n".join(f"v {x} {y} {z}" for x, y, z in box(1, 1, 1).vertices)
+    normals = "\n".join(f"vn 0 {n} 1" for n in range(1, 13))
+    text = f"mtllib absent.mtl\n{vertices}\nvt 0 0\nvt 1 0\nvt 0 1\n{normals}\nusemtl absent\n{faces}\n"
+    (tmp_path / "model.obj").write_text(text)
+    inspection = inspect_mesh(tmp_path / "model.obj", tmp_path, colors=True)
+    assert inspection.status == "clean"
+    assert len(inspection.mesh.vertices) == 8
+    assert inspection.colors is None, "a material that is missing is no colour"
+
+
+@pytest.mark.parametrize("suffix", ["glb", "gltf", "dae"])
+def test_parts_of_a_scene_are_put_in_their_places(tmp_path, suffix):
+    scene = trimesh.Scene()
+    scene.add_geometry(box(1, 1, 1), node_name="a")
+    turned = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 0, 1]) @ np.diag([2.0, 1, 1, 1])
+    turned[:3, 3] = 0, 5, 0
+    scene.add_geometry(box(1, 1, 1), node_name="b", transform=turned)
+    if suffix == "dae":
+        path = put(box(1, 1, 1), tmp_path, "model.dae")
+        node = re.search(r"<node.*</node>", path.read_text(), flags=re.DOTALL).group()
+        matrix = f"<matrix>{' '.join(map(str, turned.ravel()))}</matrix>"
+        moved = re.sub(r"(<node[^>]*)>", rf'\1 id="b">{matrix}', node.replace('id="node0"', ""))
+        path.write_text(path.read_text().replace(node, node + moved))
+    else:
+        path = put(scene, tmp_path, f"model.{suffix}")
+    mesh = read_mesh(path, tmp_path, colors=False).mesh
+    assert sorted(np.ptp(mesh.vertices, axis=0)) == pytest.approx([1, 1, 6.5])
+    assert mesh.volume == pytest.approx(3)
+    assert mesh.body_count == 2
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("damage", ["truncated", "empty", "noise"])
+def test_a_broken_file_is_one_line(tmp_path, suffix, damage):
+    path = put(box(1, 2, 3), tmp_path, f"model.{suffix}")
+    whole = path.read_bytes()
+    noise = np.random.default_rng(0).bytes(500)
+    path.write_bytes({"truncated": whole[: len(whole) // 2], "empty": b"", "noise": noise}[damage])
+    with pytest.raises(UserError) as caught:
+        read_mesh(path, tmp_path, colors=True)
+    assert single_line(str(caught.value))
+
+
+def test_collada_without_its_package_names_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(trimesh, "available_formats", lambda: {"obj", "stl"})
+    inspection = inspect_mesh(tmp_path / "model.dae", tmp_path, colors=True)
+    assert "pip install 'pycollada" in inspection.reason
+
+
+def painted(root, colors):
+    """A textured box: the halves of its picture are red and blue, and u runs along X."""
+    mesh = box(1, 1, 1).subdivide()
+    uv = np.stack([mesh.vertices[:, 0] + 0.5, np.full(len(mesh.vertices), 0.5)], axis=1)
+    picture = Image.fromarray(np.repeat(np.array([[[255, 0, 0], [0, 0, 255]]], np.uint8), 8, axis=1))
+    mesh.visual = trimesh.visual.TextureVisuals(uv, image=picture)
+    path = put(mesh, root, "model.obj")
+    return inspect_mesh(path, root, colors)
+
+
+def test_textures_become_colours_of_the_vertices(tmp_path):
+    inspection = painted(tmp_path, colors=True)
+    vertices, colors = inspection.mesh.vertices, inspection.colors
+    assert colors.shape == vertices.shape
+    assert (colors[vertices[:, 0] < -0.1] == [255, 0, 0]).all()
+    assert (colors[vertices[:, 0] > 0.1] == [0, 0, 255]).all()
+    assert painted(tmp_path, colors=False).colors is None
+
+
+def test_colours_of_materials_and_vertices(tmp_path):
+    mesh = box(1, 1, 1)
+    mesh.visual.vertex_colors = [10, 200, 30, 255]
+    for suffix in ("ply", "obj"):
+        inspection = inspect_mesh(put(mesh, tmp_path, f"model.{suffix}"), tmp_path, colors=True)
+        np.testing.assert_array_equal(inspection.colors, np.tile([10, 200, 30], (8, 1)))
+    material = trimesh.visual.material.PBRMaterial(baseColorFactor=[0.5, 0.0, 1.0, 1.0])
+    mesh.visual = trimesh.visual.TextureVisuals(uv=np.zeros((8, 2)), material=material)
+    inspection = inspect_mesh(put(mesh, tmp_path, "model.glb"), tmp_path, colors=True)
+    # glTF states colours in linear light: half of it is 188 of 255 on a screen
+    np.testing.assert_allclose(inspection.colors, np.tile([188, 0, 255], (8, 1)), atol=1)
+    plain = inspect_mesh(put(box(1, 1, 1), tmp_path, "plain.ply"), tmp_path, colors=True)
+    assert plain.colors is None
+
+
+def test_materials_and_textures_outside_the_data_set_are_not_read(tmp_path):
+    (tmp_path / "outside.mtl").write_text("newmtl red\nKd 1 0 0\n")
+    root = tmp_path / "root"
+    text = "mtllib ../outside.mtl\nusemtl red\n" + box(1, 1, 1).export(file_type="obj")
+    (root / "inner").mkdir(parents=True)
+    (root / "inner" / "model.obj").write_text(text.replace("../", "../../"))
+    raw = read_mesh(root / "inner" / "model.obj", root, colors=True)
+    assert raw.side_files == {"../../outside.mtl": ""}
+    (root / "outside.mtl").write_text("newmtl red\nKd 1 0 0\n")
+    (root / "inner" / "model.obj").write_text(text)
+    raw = read_mesh(root / "inner" / "model.obj", root, colors=True)
+    assert list(raw.side_files) == ["../outside.mtl"]
+    assert len(raw.side_files["../outside.mtl"]) == 64
+
+
+def test_a_broken_picture_costs_the_colours_alone(tmp_path):
+    painted(tmp_path, colors=True)
+    for picture in tmp_path.glob("*.png"):
+        picture.write_bytes(picture.read_bytes()[:60])
+    inspection = inspect_mesh(tmp_path / "model.obj", tmp_path, colors=True)
+    assert inspection.reason == ""
+    assert inspection.mesh.is_volume
