@@ -42,9 +42,10 @@ class OccupancyTask(lightning.LightningModule):
 
     def training_step(self, batch: Batch, batch_idx: int) -> Tensor:
         queries = batch.queries["train"]
-        loss = binary_cross_entropy_with_logits(
-            self.model(batch.views, queries.points_BN3), queries.occupied_BN
-        )
+        code = self.model.encode(batch.views)
+        logits_BN = self.model.decode(code, queries.points_BN3)
+        loss = binary_cross_entropy_with_logits(logits_BN, queries.occupied_BN)
+        loss = loss + self.model.guidance(code, queries.points_BN3, queries.occupied_BN)
         self.log("train/loss", loss, prog_bar=True, batch_size=len(batch))
         return loss
 

@@ -42,6 +42,10 @@ class OccupancyModel(nn.Module):
     def decode(self, code: Any, points_BN3: Tensor) -> Tensor:
         """Occupancy logits ``(B, N)`` of rig-frame points."""
 
+    def guidance(self, code: Any, points_BN3: Tensor, occupied_BN: Tensor) -> Tensor:
+        """What training adds to the loss of the logits: how wrong the code is about the points, a scalar."""
+        return points_BN3.new_zeros(())
+
     def decode_all(self, code: Any, points_BN3: Tensor) -> Tensor:
         """:meth:`decode` in pieces whose activations stay in the processor's cache; for eval mode."""
         piece = max(1, POINTS_IN_CACHE // len(points_BN3))

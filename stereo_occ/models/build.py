@@ -100,9 +100,9 @@ def _calibrated(
     model: type[PixelStereoModel], config: Config, rig: StereoRig, load_weights: bool
 ) -> PixelStereoModel:
     settings = _keywords(model)
-    _check_settings(config, {"feature_stride", "encoder"} | settings, "model")
+    _check_settings(config, {"feature_stride", "encoder"} | settings, "model", _optional(model))
     encoder = _encoder(config["encoder"], rig, config["feature_stride"], load_weights)
-    return model(encoder, **{name: config[name] for name in settings})
+    return model(encoder, **{name: config[name] for name in settings & config.keys()})
 
 
 MODELS: dict[str, Callable[[Config, StereoRig, bool], OccupancyModel]] = {
@@ -150,8 +150,16 @@ def _lookup(known: Mapping[str, T], config: Config, key: str) -> T:
     return known[name]
 
 
-def _check_settings(config: Config, expected: set[str], key: str) -> None:
-    unknown, missing = config.keys() - expected - {"name"}, expected - config.keys()
+def _optional(constructor: Callable[..., Any]) -> set[str]:
+    """Settings that came later than the first checkpoints, which lack them."""
+    parameters = inspect.signature(constructor).parameters.values()
+    return {parameter.name for parameter in parameters if parameter.default is not parameter.empty}
+
+
+def _check_settings(
+    config: Config, expected: set[str], key: str, optional: set[str] | frozenset[str] = frozenset()
+) -> None:
+    unknown, missing = config.keys() - expected - {"name"}, expected - config.keys() - optional
     if unknown or missing:
         problem = f"has no setting {min(unknown)}" if unknown else f"lacks the setting {min(missing)}"
         raise UserError(f"{key}={config['name']}: {problem}; it takes {', '.join(sorted(expected))}")

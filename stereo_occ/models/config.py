@@ -163,6 +163,7 @@ class PlaneSweepStereoConfig(PixelStereoConfig):
 
     name: str = "plane_sweep_stereo"
     grid: int = MISSING  # cells per side of the volume
+    around: str = "cube"  # or object: a coarse volume finds the object, and the grid lies around it
     widths: list[int] = MISSING  # channels of the U-Net's levels, the finest first
 
 

@@ -10,13 +10,16 @@ from stereo_occ.errors import UserError
 from stereo_occ.models.base import StereoViews
 from stereo_occ.models.encoders import ImageEncoder
 from stereo_occ.models.evidence import PairEvidence
+from stereo_occ.models.grid import Grid, Locator, locator_loss, working_cube
 from stereo_occ.models.pixel_stereo import CalibratedMaps, PixelStereoCode, PixelStereoModel
 from stereo_occ.models.sampling import cell_centers, sample_volume
 from stereo_occ.models.unet3d import UNet3d
 
+AROUND = ("cube", "object")
+
 
 class SweptVolume(nn.Module):
-    """Evidence of both views at each cell of a grid over the cube ``[-0.5, 0.5]^3`` of the rig frame.
+    """Evidence of both views at each cell of a grid.
 
     A plane sweep (Collins, CVPR 1996) in world space: the cells are projected with the cameras given, so any rig will
     do, toed in or not. Each cell has both views' evidence, with their features' squared difference, and its place.
@@ -37,10 +40,9 @@ class SweptVolume(nn.Module):
         self.merge = nn.Linear(self.evidence.out_channels, width, bias=False)
         self.place = nn.Linear(3, width, bias=False)
 
-    def forward(self, maps: CalibratedMaps) -> Tensor:
+    def forward(self, maps: CalibratedMaps, grid: Grid) -> Tensor:
         """Volumes ``(B, width, cells, cells, cells)``, axes z, y, x."""
-        centers_BN3 = self.centers_N3.expand(maps.features_VBCHW.shape[1], -1, -1)
-        evidence_BEN = self.evidence(maps.features_VBCHW, maps.project(centers_BN3))
+        evidence_BEN = self.evidence(maps.features_VBCHW, maps.project(grid.to_rig(self.centers_N3)))
         place_CN = self.place(self.centers_N3).mT
         matrices_BCE = self.merge.weight.expand(len(evidence_BEN), -1, -1)
         volume_BCN = torch.baddbmm(place_CN, matrices_BCE, evidence_BEN)
@@ -49,8 +51,9 @@ class SweptVolume(nn.Module):
 
 @dataclass(frozen=True)
 class PlaneSweepCode(PixelStereoCode):
-    """With a volume ``(B, C, D, H, W)`` over the cube, axes z, y, x."""
+    """With a volume ``(B, C, D, H, W)`` over the cells of a grid, axes z, y, x."""
 
+    grid: Grid
     volume_BCDHW: Tensor
 
 
@@ -59,11 +62,13 @@ class PlaneSweepStereoModel(PixelStereoModel):
 
     Args:
         grid: cells per side of the volume.
+        around: ``cube``: the volume is over the whole working cube; ``object``: over a cube around the object, which
+            a volume of half as many cells per side over the working cube finds first.
         widths: channels of each level of the U-Net, the finest first.
         views, groups, frequencies, code_size, hidden, blocks: see :class:`PixelStereoModel`.
 
     Raises:
-        UserError: if the grid cannot be halved often enough.
+        UserError: if the grid cannot be halved often enough, or lies around something else.
     """
 
     def __init__(
@@ -71,6 +76,7 @@ class PlaneSweepStereoModel(PixelStereoModel):
         encoder: ImageEncoder,
         *,
         grid: int,
+        around: str = "cube",
         widths: Sequence[int],
         views: str,
         groups: int,
@@ -79,9 +85,11 @@ class PlaneSweepStereoModel(PixelStereoModel):
         hidden: int,
         blocks: int,
     ) -> None:
+        if around not in AROUND:
+            raise UserError(f"model.around: must be one of {', '.join(AROUND)}, got {around}")
         super().__init__(
             encoder,
-            widths[0],
+            widths[0] + (3 if around == "object" else 0),
             views=views,
             groups=groups,
             frequencies=frequencies,
@@ -95,15 +103,31 @@ class PlaneSweepStereoModel(PixelStereoModel):
             raise UserError(
                 f"model.grid: must be a multiple of {self.unet.multiple} for {len(widths)} model.widths, got {grid}"
             )
+        self.scout = (
+            SweptVolume(encoder.channels, groups, grid // 2, widths[0]) if around == "object" else None
+        )
+        self.locator = Locator(grid // 2, widths[0]) if around == "object" else None
 
     def encode(self, views: StereoViews) -> PlaneSweepCode:
         """Maps of the views, their common code and the completed volume."""
         pair = super().encode(views)
-        return PlaneSweepCode(pair.maps, pair.global_BC, self.unet(self.sweep(pair.maps)))
+        grid = working_cube(len(views.left_BCHW), views.left_BCHW.device)
+        if self.scout is not None and self.locator is not None:
+            grid = self.locator(self.scout(pair.maps, grid))
+        volume_BCDHW = self.unet(self.sweep(pair.maps, grid.detach()))
+        return PlaneSweepCode(pair.maps, pair.global_BC, grid, volume_BCDHW)
+
+    def guidance(self, code: PlaneSweepCode, points_BN3: Tensor, occupied_BN: Tensor) -> Tensor:
+        """The locator's loss."""
+        if self.locator is None:
+            return super().guidance(code, points_BN3, occupied_BN)
+        return locator_loss(code.grid, points_BN3, occupied_BN)
 
     def token(self, code: PixelStereoCode, points_BN3: Tensor) -> Tensor:
-        """Evidence, place and the volume's features ``(B, N, T)`` of each point."""
+        """Evidence, place, place in the grid, and the volume's features ``(B, N, T)`` of each point."""
         assert isinstance(code, PlaneSweepCode)
-        return torch.cat(
-            [super().token(code, points_BN3), sample_volume(code.volume_BCDHW, points_BN3).mT], dim=-1
-        )
+        local_BN3 = code.grid.detach().to_local(points_BN3)
+        parts = [super().token(code, points_BN3), sample_volume(code.volume_BCDHW, local_BN3).mT]
+        if self.locator is not None:
+            parts.append(local_BN3.clamp(-1, 1))
+        return torch.cat(parts, dim=-1)

@@ -63,14 +63,17 @@ def sample_maps(features_VBCHW: Tensor, positions_VBN2: Tensor) -> Tensor:
 
 
 def cell_centers(cells: int) -> Tensor:
-    """Centres ``(cells^3, 3)``, metres, of a grid over the working volume; z outermost, x innermost."""
+    """Centres ``(cells^3, 3)`` of a grid's cells, in its sides from its centre; z outermost, x innermost."""
     centers = (torch.arange(cells) + 0.5) / cells - 0.5
     z, y, x = torch.meshgrid(centers, centers, centers, indexing="ij")
     return torch.stack([x, y, z], dim=-1).view(-1, 3)
 
 
 def sample_volume(volume_BCDHW: Tensor, points_BN3: Tensor) -> Tensor:
-    """Features ``(B, C, N)`` of a volume over the grid of :func:`cell_centers`, trilinear, as :func:`sample_maps`."""
+    """Features ``(B, C, N)`` of a volume over the grid of :func:`cell_centers`, trilinear, as :func:`sample_maps`.
+
+    Points are in sides of the grid from its centre, as the cells' centres are.
+    """
     B, N, _ = points_BN3.shape
     samples_BCN11 = grid_sample(
         volume_BCDHW.float(),

@@ -29,6 +29,8 @@ PIXEL = {
 }
 SWEEP = PIXEL | {"name": "plane_sweep_stereo", "grid": 8, "widths": [8, 16]}
 
+AROUND_OBJECT = SWEEP | {"around": "object"}
+
 
 def build(config, **settings):
     """A model with nothing left at zero and running statistics of its own, in eval mode."""
@@ -46,7 +48,7 @@ def some_points(batch, count=200, seed=0):
     return torch.rand(batch, count, 3, generator=torch.Generator().manual_seed(seed)) - 0.5
 
 
-@pytest.fixture(params=[PIXEL, SWEEP], ids=["pixel", "sweep"])
+@pytest.fixture(params=[PIXEL, SWEEP, AROUND_OBJECT], ids=["pixel", "sweep", "around object"])
 def config(request):
     return request.param
 

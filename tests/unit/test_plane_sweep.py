@@ -7,6 +7,7 @@ from rigs import HEIGHT, WIDTH, cameras_VB, random_pairs, random_rig
 
 from stereo_occ.errors import UserError
 from stereo_occ.models.evidence import PairEvidence, groupwise_correlation, positional_encoding
+from stereo_occ.models.grid import Grid, working_cube
 from stereo_occ.models.light import LightEncoder
 from stereo_occ.models.pixel_stereo import CalibratedMaps
 from stereo_occ.models.plane_sweep import PlaneSweepStereoModel, SweptVolume
@@ -118,12 +119,16 @@ def test_a_point_that_one_view_sees_has_that_views_evidence_and_no_comparison():
     torch.testing.assert_close(pair[both][:, -2:], torch.ones(int(both.sum()), 2))
 
 
-def test_the_volume_at_a_cells_centre_is_the_evidence_of_that_point():
+@pytest.mark.parametrize("around", ["cube", "object"])
+def test_the_volume_at_a_cells_centre_is_the_evidence_of_that_point(around):
     maps, sweep = pair_maps(), SweptVolume(8, 2, cells=6, width=6)
+    grid = working_cube(3, torch.device("cpu"))
+    if around == "object":
+        grid = Grid(torch.tensor([[0.1, -0.2, 0], [0, 0.1, 0.2], [0, 0, 0]]), torch.tensor([0.5, 0.4, 1]))
     centers = sweep.centers_N3.expand(3, -1, -1)
     with torch.no_grad():
-        volume = sweep(maps)
-        evidence = sweep.evidence(maps.features_VBCHW, maps.project(centers))
+        volume = sweep(maps, grid)
+        evidence = sweep.evidence(maps.features_VBCHW, maps.project(grid.to_rig(sweep.centers_N3)))
         expected = evidence.mT @ sweep.merge.weight.T + sweep.place(centers)
     assert volume.shape == (3, 6, 6, 6, 6)
     torch.testing.assert_close(sample_volume(volume, centers).mT, expected)
@@ -147,6 +152,13 @@ def test_a_grid_that_cannot_be_halved_is_refused():
         PlaneSweepStereoModel(encoder, grid=10, widths=[4, 4, 4], **settings)
 
 
+def test_a_grid_around_something_else_is_refused():
+    encoder = LightEncoder(stride=4, channels=8, widths=[8, 8, 8, 8], blocks=[1, 1, 1, 1])
+    settings = {"views": "both", "groups": 2, "frequencies": 2, "code_size": 8, "hidden": 8, "blocks": 1}
+    with pytest.raises(UserError, match=r"model\.around: must be one of cube, object, got mug"):
+        PlaneSweepStereoModel(encoder, grid=4, around="mug", widths=[4, 4], **settings)
+
+
 def test_groups_must_divide_the_channels():
     with pytest.raises(UserError, match=r"model\.groups: must divide the 4 channels of the evidence, got 3"):
         PairEvidence(8, 3, 4, torch.abs)
@@ -167,3 +179,22 @@ def test_the_volume_alone_tells_samples_apart():
     torch.testing.assert_close(same[0], other[0])
     torch.testing.assert_close(same[1, :, :-4], other[1, :, :-4])
     torch.testing.assert_close(same[1, :, -4:] + 1, other[1, :, -4:])
+
+
+def test_guidance_teaches_what_finds_the_object_and_the_logits_what_is_in_the_grid():
+    torch.manual_seed(0)
+    encoder = LightEncoder(stride=4, channels=8, widths=[8, 8, 8, 8], blocks=[1, 1, 1, 1])
+    settings = {"views": "both", "groups": 2, "frequencies": 2, "code_size": 8, "hidden": 8, "blocks": 1}
+    model = PlaneSweepStereoModel(encoder, grid=4, around="object", widths=[4, 4], **settings)
+    points, occupied = torch.rand(3, 40, 3) - 0.5, torch.ones(3, 40)
+    code = model.encode(random_pairs(3))
+    parts = {"locator": model.locator, "scout": model.scout, "sweep": model.sweep, "unet": model.unet}
+
+    def taught(value):
+        model.zero_grad()
+        value.backward(retain_graph=True)
+        grads = {name: [p.grad for p in part.parameters()] for name, part in parts.items()}
+        return {name for name, g in grads.items() if any(x is not None and x.any() for x in g)}
+
+    assert taught(model.guidance(code, points, occupied)) == {"locator", "scout"}
+    assert taught(model.decode(code, points).sum()) == {"sweep", "unet"}
