@@ -18,7 +18,6 @@ from stereo_occ.errors import UserError
 from stereo_occ.models.build import build_model
 from stereo_occ.optimization import OPTIMIZERS, SCHEDULES
 from stereo_occ.problems import nearest
-from stereo_occ.render.appearance import draw_appearance
 from stereo_occ.shapes.shape import CATEGORIES
 
 ACCELERATORS = ("cpu", "gpu", "auto")

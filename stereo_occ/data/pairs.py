@@ -1,17 +1,21 @@
 """The pictures of one object: scenes and appearances drawn from a configuration, and rendered."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from stereo_occ.config import PairsConfig
+from stereo_occ.data.look import dressed
 from stereo_occ.data.rigs import RectifiedRigConfig
 from stereo_occ.data.scene import Scene, draw_scene
 from stereo_occ.data.shard import Views
 from stereo_occ.render.appearance import draw_appearance
+from stereo_occ.render.sensor import photograph
 from stereo_occ.render.stereo import StereoImages, StereoRenderer
 from stereo_occ.shapes.shape import Shape
 
 # Independent random streams of one object. What is drawn from one does not change what is drawn from another.
-POINTS_STREAM, VIEWS_STREAM, SCENE_STREAM = range(3)
+POINTS_STREAM, VIEWS_STREAM, SCENE_STREAM, TEXTURE_STREAM, CLUTTER_STREAM, SENSOR_STREAM = range(6)
 
 
 def render_views(shape: Shape, pairs: PairsConfig, object_seed: list[int], renderer: StereoRenderer) -> Views:
@@ -20,19 +24,35 @@ def render_views(shape: Shape, pairs: PairsConfig, object_seed: list[int], rende
     Raises:
         UserError: for ranges out of their limits, or if OpenGL cannot be started.
     """
-    renderer.load(shape.mesh)
+    renderer.load(shape.mesh, shape.colors)
     hull_N3 = shape.mesh.vertices
-    if isinstance(pairs.rig, RectifiedRigConfig):
+    if isinstance(pairs.rig, RectifiedRigConfig) or pairs.background.clutter is not None:
         hull_N3 = shape.mesh.convex_hull.vertices
     scenes: list[Scene] = []
     pictures: list[StereoImages] = []
     for view in range(pairs.data.views):
-        rng, scene_rng = (
-            np.random.default_rng([*object_seed, stream, view]) for stream in (VIEWS_STREAM, SCENE_STREAM)
+
+        def stream(number: int, view: int = view) -> np.random.Generator:
+            return np.random.default_rng([*object_seed, number, view])
+
+        rng = stream(VIEWS_STREAM)
+        scene = draw_scene(
+            pairs.rig, pairs.placement, pairs.data.image_side, hull_N3, rng, stream(SCENE_STREAM)
         )
-        scene = draw_scene(pairs.rig, pairs.placement, pairs.data.image_side, hull_N3, rng, scene_rng)
-        appearance = draw_appearance(pairs.lights, pairs.material, pairs.background, rng)
-        pictures.append(renderer.render(scene.true_rig, scene.pose.rig_from_object, appearance))
+        appearance = dressed(
+            draw_appearance(pairs.lights, pairs.material, pairs.background, rng),
+            pairs.texture,
+            pairs.background,
+            scene,
+            hull_N3,
+            shape.colors is not None,
+            [stream(TEXTURE_STREAM), stream(CLUTTER_STREAM)],
+        )
+        images = renderer.render(scene.true_rig, scene.pose.rig_from_object, appearance)
+        rgb_2HW3 = photograph(
+            images, scene.true_rig, pairs.sensor, appearance, pairs.background.masked, stream(SENSOR_STREAM)
+        )
+        pictures.append(replace(images, rgb_2HW3=rgb_2HW3))
         scenes.append(scene)
     unit_N = np.array([scene.unit for scene in scenes])
     return Views(

@@ -1,4 +1,4 @@
-"""What a view pair looks like: lights, material, background.
+"""What a view pair looks like: lights, material, background; see also ``texture``, ``clutter`` and ``sensor``.
 
 A config gives ranges ``[low, high]``; :func:`draw_appearance` draws one value from each. A fixed value is a range of
 no width. Reflectance is linear; the background, which is not lit, is in display values (what an image file holds).
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from omegaconf import MISSING
 
 from stereo_occ.ranges import bounds, draw
+from stereo_occ.render.clutter import Clutter, ClutterConfig
+from stereo_occ.render.finish import Finish
 
 #: The shader's limit on directional lights.
 MAX_LIGHTS = 4
@@ -49,6 +51,7 @@ class MaterialConfig:
     value: list[float] = MISSING  # 0 to 1: the largest of the three linear reflectances
     metallic: list[float] = MISSING  # 0 to 1
     roughness: list[float] = MISSING  # 0 to 1
+    reflection: list[float] | None = None  # how strongly windows and lamps are mirrored; 1: a clean glaze
 
 
 @dataclass
@@ -58,6 +61,8 @@ class BackgroundConfig:
     low: list[float] = MISSING  # red, green, blue display values, 0 to 1
     high: list[float] = MISSING
     contrast: float = MISSING  # least distance in display RGB from the object's base colour
+    masked: bool = False  # that colour replaces, in the finished picture, all but the object
+    clutter: ClutterConfig | None = None  # things in place of the colour
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +76,9 @@ class Appearance:
         base_color_3: linear reflectance, 0 to 1.
         metallic, roughness: 0 to 1.
         background_3: uint8 display RGB.
+        reflection: how strongly windows and lamps are mirrored.
+        finish: of the object with its texture; None: one colour.
+        clutter: what is around the object; None: nothing.
     """
 
     light_from_L3: NDArray[np.float64]
@@ -80,6 +88,9 @@ class Appearance:
     metallic: float
     roughness: float
     background_3: NDArray[np.uint8]
+    reflection: float = 0.0
+    finish: Finish | None = None
+    clutter: Clutter | None = None
 
 
 def draw_appearance(
@@ -107,6 +118,9 @@ def draw_appearance(
         metallic=draw(material.metallic, "material.metallic", rng),
         roughness=draw(material.roughness, "material.roughness", rng),
         background_3=_draw_background(background, base_color_3, rng),
+        reflection=0.0
+        if material.reflection is None
+        else draw(material.reflection, "material.reflection", rng, 0, 5),
     )
 
 

@@ -9,14 +9,14 @@ from trimesh import Trimesh
 
 def split_at_creases(
     mesh: Trimesh, crease_angle: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
     """Split vertices along edges whose faces meet at more than ``crease_angle`` radians.
 
     The corners of a vertex that are joined by smooth edges share one normal: the mean of their face normals,
     weighted by the corner's angle (Thuermer and Wuethrich, Journal of Graphics Tools 3(1), 1998).
 
     Returns:
-        Positions ``(V, 3)``, unit normals ``(V, 3)`` and faces ``(F, 3)``; F is unchanged.
+        Which vertex of the mesh each one is ``(V,)``, unit normals ``(V, 3)`` and faces ``(F, 3)``; F is unchanged.
     """
     faces_F3 = mesh.faces
     smooth = mesh.face_adjacency_angles <= crease_angle
@@ -32,6 +32,6 @@ def split_at_creases(
     weighted_C3 = (mesh.face_angles[:, :, None] * mesh.face_normals[:, None, :]).reshape(-1, 3)
     normals_V3 = np.stack([np.bincount(group_C, weighted_C3[:, axis], count) for axis in range(3)], axis=1)
     length_V1 = np.linalg.norm(normals_V3, axis=1, keepdims=True)
-    positions_V3 = np.empty((count, 3))
-    positions_V3[group_C] = mesh.vertices[faces_F3.ravel()]
-    return positions_V3, normals_V3 / np.maximum(length_V1, 1e-12), group_C.reshape(-1, 3).astype(np.int64)
+    source_V = np.empty(count, np.int64)
+    source_V[group_C] = faces_F3.ravel()
+    return source_V, normals_V3 / np.maximum(length_V1, 1e-12), group_C.reshape(-1, 3).astype(np.int64)

@@ -1,6 +1,7 @@
 """Stereo pairs of one object: colour, coverage and metric depth."""
 
 from dataclasses import dataclass
+from importlib import import_module
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
@@ -14,6 +15,8 @@ from stereo_occ.render.appearance import MAX_LIGHTS, Appearance
 from stereo_occ.render.gl import import_pyrender, process_renderer
 from stereo_occ.render.normals import split_at_creases
 from stereo_occ.render.pixels import center_depth, mean_color, over
+from stereo_occ.render.texture import plain_finish
+from stereo_occ.render.vertices import SceneLight, object_vertices, surroundings
 
 #: Edges sharper than this stay sharp.
 CREASE_ANGLE = np.radians(40)
@@ -55,6 +58,7 @@ class StereoRenderer:
         self._light_nodes = [self._scene.add(self._pyrender.DirectionalLight()) for _ in range(MAX_LIGHTS)]
         self._material = self._pyrender.MetallicRoughnessMaterial()
         self._mesh_node: Any = None
+        self._surfaces: Any = None
 
     def __enter__(self) -> Self:
         return self
@@ -70,18 +74,22 @@ class StereoRenderer:
             self._scene.remove_node(self._mesh_node)
             self._mesh_node = None
 
-    def load(self, mesh: Trimesh) -> None:
-        """Make ``mesh`` (object frame) the one that is rendered."""
+    def load(self, mesh: Trimesh, colors_V3: NDArray[np.uint8] | None = None) -> None:
+        """Make ``mesh`` (object frame) the one that is rendered; ``colors_V3`` are its vertices' own, sRGB."""
         self.close()
         if mesh.volume < 0:
             mesh = mesh.copy()
             mesh.invert()
-        positions_V3, normals_V3, faces_F3 = split_at_creases(mesh, CREASE_ANGLE)
+        source_V, normals_V3, faces_F3 = split_at_creases(mesh, CREASE_ANGLE)
+        positions_V3 = mesh.vertices[source_V]
         self._material.doubleSided = not mesh.is_volume
         primitive = self._pyrender.Primitive(
             positions=positions_V3, normals=normals_V3, indices=faces_F3, material=self._material
         )
         self._mesh_node = self._scene.add(self._pyrender.Mesh([primitive]))
+        self._surfaces_loaded = False
+        own_V3 = None if colors_V3 is None else colors_V3[source_V]
+        self._parts = object_vertices(positions_V3, normals_V3, own_V3), faces_F3
 
     def render(
         self, rig: StereoRig, rig_from_object: NDArray[np.float64], appearance: Appearance
@@ -101,12 +109,16 @@ class StereoRenderer:
         _check_rig(rig)
         if not np.linalg.det(rig_from_object[:3, :3]) > 0:
             raise UserError(f"rig_from_object: must not mirror the object, got {rig_from_object.tolist()}")
-        self._scene.set_pose(self._mesh_node, rig_from_object)
-        self._set_appearance(appearance)
-        views = [self._samples(camera) for camera in rig.cameras]
+        if appearance.finish is None and appearance.clutter is None and appearance.reflection == 0:
+            self._scene.set_pose(self._mesh_node, rig_from_object)
+            self._set_appearance(appearance)
+            views = [self._samples(camera) for camera in rig.cameras]
+        else:
+            views = self._surface_samples(rig, rig_from_object, appearance)
         rgba_2HW4 = mean_color(np.stack([rgba for rgba, _ in views]), self._supersampling)
+        alone = appearance.clutter is None
         return StereoImages(
-            rgb_2HW3=over(rgba_2HW4, appearance.background_3),
+            rgb_2HW3=over(rgba_2HW4, appearance.background_3) if alone else rgba_2HW4[..., :3],
             mask_2HW=rgba_2HW4[..., 3],
             depth_2HW=center_depth(np.stack([depth for _, depth in views]), self._supersampling),
         )
@@ -123,6 +135,41 @@ class StereoRenderer:
         self._material.baseColorFactor = [*appearance.base_color_3, 1.0]
         self._material.metallicFactor = appearance.metallic
         self._material.roughnessFactor = appearance.roughness
+
+    def _surface_samples(
+        self, rig: StereoRig, rig_from_object: NDArray[np.float64], appearance: Appearance
+    ) -> list[tuple[NDArray[np.uint8], NDArray[np.float32]]]:
+        """As :meth:`_samples`; the colour of what is not the object is not weighted by its alpha, which is 0."""
+        if self._surfaces is None:
+            self._surfaces = import_module("stereo_occ.render.surfaces").SurfaceDrawing()  # needs OpenGL
+        if not self._surfaces_loaded:
+            self._surfaces.load_object(*self._parts)
+            self._surfaces_loaded = True
+        finish, clutter = appearance.finish or plain_finish(appearance), appearance.clutter
+        self._surfaces.load_things(*surroundings(clutter))
+        light = SceneLight(
+            appearance.light_from_L3,
+            appearance.light_color_L3,
+            appearance.ambient,
+            np.array([0.0, 1.0, 0.0]) if clutter is None else clutter.up_3,
+        )
+        finishes = [finish, *([] if clutter is None else clutter.finishes)]
+        self._surfaces.set_look(finishes, np.zeros((0, 4)) if clutter is None else clutter.contacts_C4, light)
+        return [
+            self._surfaces.samples(
+                self._supersampled(camera),
+                rig_from_object,
+                finish.texture_from_object,
+                self._material.doubleSided,
+            )
+            for camera in rig.cameras
+        ]
+
+    def _supersampled(self, camera: Camera) -> Camera:
+        factor = self._supersampling
+        K = camera.K * np.array([factor, factor, 1])[:, None]
+        K[:2, 2] += (factor - 1) / 2
+        return Camera(K, camera.camera_from_rig, factor * camera.width, factor * camera.height)
 
     def _samples(self, camera: Camera) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Premultiplied colour and coverage ``(H, W, 4)`` and depth ``(H, W)`` of the samples of all pixels."""
