@@ -56,7 +56,7 @@ class Locator(nn.Module):
         self.layers = nn.Sequential(
             *_normalized_conv(width), *_normalized_conv(width), nn.BatchNorm3d(width), nn.ReLU()
         )
-        self.attention = nn.Conv3d(width, 1, 1)
+        self.attention = nn.Conv3d(width, 1, 1, bias=False)
         self.size = nn.Linear(width, 1)
 
     def forward(self, volume_BCDHW: Tensor) -> Grid:

@@ -172,8 +172,9 @@ def test_answers_under_autocast_are_float32_and_close(model):
 @pytest.mark.parametrize("stride", [2, 4])
 def test_training_reaches_every_parameter(config, views, stride):
     model = build(config, views=views, feature_stride=stride).train()
-    logits = model(random_pairs(3), some_points(3))
-    logits.square().mean().backward()
+    code, points = model.encode(random_pairs(3)), some_points(3)
+    loss = model.decode(code, points).square().mean() + model.guidance(code, points, torch.ones(3, 200))
+    loss.backward()
     silent = [n for n, p in model.named_parameters() if p.grad is None or p.grad.abs().max() < 1e-9]
     assert silent == []
 
