@@ -32,15 +32,14 @@ def evaluation(workshop, run, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def meshes(tmp_path_factory):
-    """Two usable mugs, a usable bowl, an open bottle, and a folder that is no category."""
+    """Two usable mugs, a usable bowl, a bottle that is a flat sheet, and a folder that is no category."""
     root = tmp_path_factory.mktemp("meshes")
     for name, extents in (("mug/tall", (1, 2, 1)), ("mug/wide", (3, 1, 1)), ("bowl/flat", (2, 1, 2))):
         (root / name).mkdir(parents=True)
         trimesh.creation.box(extents=extents).export(root / name / "model.obj")
-    (root / "bottle" / "open").mkdir(parents=True)
-    opened = trimesh.creation.box()
-    opened.update_faces(np.arange(12) < 11)
-    opened.export(root / "bottle" / "open" / "model.obj")
+    (root / "bottle" / "sheet").mkdir(parents=True)
+    sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
+    sheet.export(root / "bottle" / "sheet" / "model.obj")
     (root / "vase" / "x").mkdir(parents=True)
     return root
 
@@ -102,13 +101,13 @@ def test_batches_do_not_change_the_result(workshop, run, tmp_path, evaluation):
 
 def test_a_folder_of_meshes(workshop, run, meshes, tmp_path):
     metrics = workshop.evaluate(
-        run / "best.ckpt", tmp_path, "data=meshes", f"data.root={meshes}", "data.pool_size=1000", "subset=all"
+        run / "best.ckpt", tmp_path, "data=meshes", f"data.root={meshes}", "data.pool_size=1000"
     )
     results = json.loads((tmp_path / "metrics.json").read_text())
-    assert (results["objects"], results["skipped"]) == (3, 2)
+    assert (results["subset"], results["objects"], results["skipped"]) == ("all", 3, 2)
     assert [row["object_id"] for row in rows(tmp_path / "per_object.csv")] == ["flat", "tall", "wide"]
     reasons = {row["category"]: row["reason"] for row in rows(tmp_path / "skipped.csv")}
-    assert reasons["bottle"].startswith("not watertight")
+    assert reasons["bottle"].startswith("encloses no volume")
     assert "not a category" in reasons["vase"]
     assert set(metrics) >= {"test/iou", "test/iou/mug", "test/iou/bowl"}
     assert "test/iou/bottle" not in metrics
@@ -144,10 +143,8 @@ def test_what_the_checkpoints_data_cannot_give(workshop, run, tmp_path, override
 
 def test_a_folder_without_a_solid(workshop, run, meshes, tmp_path):
     shutil.copytree(meshes / "bottle", tmp_path / "only" / "bottle")
-    with pytest.raises(UserError, match=r"no watertight mesh of mug, bowl, bottle among 1 files"):
-        workshop.evaluate(
-            run / "best.ckpt", tmp_path, "data=meshes", f"data.root={tmp_path / 'only'}", "subset=all"
-        )
+    with pytest.raises(UserError, match=r"no usable object of mug, bowl, bottle; .*inspect"):
+        workshop.evaluate(run / "best.ckpt", tmp_path, "data=meshes", f"data.root={tmp_path / 'only'}")
 
 
 def test_a_configuration_of_another_version(workshop, run, tmp_path):
