@@ -75,14 +75,14 @@ def export_npz(shards: list[Shard], folder: Path) -> None:
         pool = shard.pool("box")
         points_N3, occupied_N = pool.points_N3, pool.occupied_N
         np.savez(target / "points.npz", points=points_N3, occupancies=np.packbits(occupied_N))
-        K, camera_from_rig = shard.cameras
-        for view, pose in enumerate(shard.poses):
+        for view in range(len(shard)):
+            K, camera_from_rig = shard.cameras(view)
             np.savez(
                 target / f"pair_{view:03d}.npz",
                 images=shard.rgb(view),
-                K=K[view],
-                camera_from_rig=camera_from_rig[view],
-                rig_from_object=pose.rig_from_object,
+                K=K,
+                camera_from_rig=camera_from_rig,
+                rig_from_object=shard.pose(view).rig_from_object,
             )
 
 

@@ -33,7 +33,7 @@ def check_pairs(cfg: DictConfig) -> list[str]:
 
 def check_rendering(cfg: DictConfig) -> list[str]:
     """Problems of a rendering configuration."""
-    return [*check_pairs(cfg), *_known("subset", cfg.subset, (*SUBSETS, "all"))]
+    return [*check_pairs(cfg), *_known("subset", cfg.subset, (*SUBSETS, "all")), *_slice(cfg)]
 
 
 def check_training(cfg: DictConfig) -> list[str]:
@@ -63,6 +63,12 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
     if cfg.data is not None and "root" in cfg.data:
         problems += _folder(cfg)
     return problems
+
+
+def _slice(cfg: DictConfig) -> Iterator[str]:
+    yield from _at_least(1, cfg, "slice.of")
+    if not 1 <= cfg.slice.index <= max(1, cfg.slice.of):
+        yield f"slice.index={cfg.slice.index}: must be 1 to slice.of={cfg.slice.of}"
 
 
 def _objects(cfg: DictConfig) -> Iterator[str]:

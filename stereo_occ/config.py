@@ -11,7 +11,7 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from stereo_occ.data.config import DATA_SCHEMAS, DataConfig
+from stereo_occ.data.config import DATA_SCHEMAS, DataConfig, SliceConfig
 from stereo_occ.data.placement import PlacementConfig
 from stereo_occ.data.rigs import RIG_SCHEMAS, RigConfig, ToedInRigConfig
 from stereo_occ.errors import UserError
@@ -201,6 +201,8 @@ class RenderConfig(PairsConfig):
     """``python -m stereo_occ.render``"""
 
     subset: str = "all"  # train, val, test or all
+    slice: SliceConfig = field(default_factory=SliceConfig)
+    verify: bool = False  # render nothing, compare what is there with its checksums
     progress: bool = field(default=True)
 
 

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from stereo_occ.data.shard import Views, write_shard
+from stereo_occ.data.shard import Views
+from stereo_occ.data.shard_writing import write_shard
 from stereo_occ.geometry.camera import toed_in_rig
 from stereo_occ.geometry.pose import Pose
 from stereo_occ.geometry.rotations import random_rotations

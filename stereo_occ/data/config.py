@@ -14,6 +14,14 @@ class SplitKind(Enum):
 
 
 @dataclass
+class SliceConfig:
+    """Every ``of``-th object, beginning with number ``index``: what one of several machines renders."""
+
+    index: int = 1  # 1 to of
+    of: int = 1
+
+
+@dataclass
 class DataConfig:
     """Which objects, how many views of each, how they are divided."""
 

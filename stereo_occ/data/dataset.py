@@ -80,9 +80,7 @@ class PairsDataset(Dataset[Batch]):
         located = [self.locate(item) for item in items]
         rgb_B2HWC = torch.from_numpy(np.stack([shard.rgb(view) for shard, view in located]))
         rgb_2BCHW = rgb_B2HWC.permute(1, 0, 4, 2, 3).float().div_(255)
-        K_B, camera_from_rig_B = zip(
-            *((shard.cameras[0][view], shard.cameras[1][view]) for shard, view in located), strict=True
-        )
+        K_B, camera_from_rig_B = zip(*(shard.cameras(view) for shard, view in located), strict=True)
         return Batch(
             views=StereoViews(
                 rgb_2BCHW[0], rgb_2BCHW[1], _float(np.stack(K_B)), _float(np.stack(camera_from_rig_B))
@@ -114,7 +112,7 @@ class TrainingPairs(PairsDataset):
 
     def _points(self, draw: Draw) -> LabelledPoints:
         shard, view = self.locate(draw.item)
-        pose, box = shard.poses[view], shard.pool("box")
+        pose, box = shard.pose(view), shard.pool("box")
         rng = np.random.default_rng([self.seed, draw.position])
         parts = []
         if self.counts["box"]:
@@ -145,7 +143,7 @@ class EvaluationPairs(PairsDataset):
 
     def _points(self, item: int) -> dict[str, LabelledPoints]:
         shard, view = self.locate(item)
-        pose, pool = shard.poses[view], shard.pool("box")
+        pose, pool = shard.pose(view), shard.pool("box")
         rng = np.random.default_rng([crc32(f"{shard.category}/{shard.object_id}".encode()), view])
         bbox = bbox_queries(pool, pose, self.points, rng)
         cube = cube_queries(pool, pose, self.points, rng)

@@ -26,5 +26,5 @@ def examples(dataset: EvaluationPairs, count: int) -> Iterator[Example]:
         if shown[shard.category] < count:
             shown[shard.category] += 1
             batch = dataset.__getitems__([index * len(dataset.views)])
-            pose = shard.poses[dataset.views[0]]
+            pose = shard.pose(dataset.views[0])
             yield Example(batch.ids[0], batch, shard.mesh.apply_transform(pose.rig_from_object))

@@ -4,6 +4,7 @@ import hashlib
 import json
 import multiprocessing
 import os
+import socket
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -17,13 +18,14 @@ import numpy as np
 from tqdm import tqdm
 
 from stereo_occ.config import PairsConfig
-from stereo_occ.data.config import NOT_CONTENT
+from stereo_occ.data.config import NOT_CONTENT, SliceConfig
 from stereo_occ.data.meshes import MeshRecord
 from stereo_occ.data.objects import ObjectSource, list_objects, members
 from stereo_occ.data.pairs import POINTS_STREAM, render_views
 from stereo_occ.data.processes import start_worker
 from stereo_occ.data.rigs import ToedInRigConfig
-from stereo_occ.data.shard import VERSION, remove_partial, write_shard
+from stereo_occ.data.shard import VERSION
+from stereo_occ.data.shard_writing import partial_path, remove_partial, write_shard
 from stereo_occ.errors import UserError
 from stereo_occ.occupancy.pools import box_pool, surface_pool
 from stereo_occ.render.stereo import StereoRenderer
@@ -44,27 +46,29 @@ class PreparedShards:
     records: list[MeshRecord]
 
 
-def prepare(pairs: PairsConfig, progress: bool, subset: str = "all") -> PreparedShards:
+def prepare(
+    pairs: PairsConfig, progress: bool, subset: str = "all", part: SliceConfig | None = None
+) -> PreparedShards:
     """Make sure that every shard of ``pairs`` exists; render the missing ones with a progress bar.
 
     A shard's content depends on the configuration and the object alone: not on the number of processes, nor on which
-    other objects are asked for, nor on interruptions.
+    other objects are asked for, nor on interruptions. Any number of processes and machines may do this at once in the
+    same folder.
 
     Args:
         subset: ``train``, ``val`` or ``test`` for the shards of that subset alone.
+        part: a slice of these shards, for several machines to share the work.
 
     Raises:
         UserError: from the objects, the renderer or the disk.
     """
-    objects = list_objects(pairs, progress)
-    sources = members(objects.sources, pairs, subset)
-    folder = Path(pairs.paths.data) / _folder_name(pairs)
-    paths = [folder / source.category / source.file_name for source in sources]
-    missing = [(source, path) for source, path in zip(sources, paths, strict=True) if not path.exists()]
+    prepared = locate(pairs, progress, subset, part)
+    found = zip(prepared.sources, prepared.paths, strict=True)
+    missing = [(source, path) for source, path in found if not path.exists()]
     if missing:
-        remove_partial(folder)
-        _write_description(folder, pairs)
-        workers = min(len(missing), pairs.workers or os.cpu_count() or 1)
+        remove_partial(prepared.folder)
+        _write_description(prepared.folder, pairs)
+        workers = min(len(missing), pairs.workers or len(os.sched_getaffinity(0)))
         bar = tqdm(
             total=len(missing) * pairs.data.views,
             desc="rendering",
@@ -75,6 +79,19 @@ def prepare(pairs: PairsConfig, progress: bool, subset: str = "all") -> Prepared
         with bar:
             for _ in _render_all(missing, pairs, workers):
                 bar.update(pairs.data.views)
+    return prepared
+
+
+def locate(
+    pairs: PairsConfig, progress: bool, subset: str = "all", part: SliceConfig | None = None
+) -> PreparedShards:
+    """Where the shards of ``pairs`` are, or will be when they are rendered; see :func:`prepare`."""
+    objects = list_objects(pairs, progress)
+    sources = members(objects.sources, pairs, subset)
+    if part is not None:
+        sources = sources[part.index - 1 :: part.of]
+    folder = Path(pairs.paths.data) / _folder_name(pairs)
+    paths = [folder / source.category / source.file_name for source in sources]
     return PreparedShards(folder, sources, paths, objects.skipped, objects.records)
 
 
@@ -142,6 +159,11 @@ def _description(pairs: PairsConfig) -> dict[str, object]:
     if not parts["background"]["masked"]:
         del parts["background"]["masked"]
     parts |= {name: asdict(group) for name in ("texture", "sensor") if not (group := getattr(pairs, name)).off}
+    if not parts["background"]["masked"]:
+        del parts["background"]["masked"]
+    parts |= {
+        name: asdict(group) for name in ("texture", "sensor") if not (group := getattr(pairs, name)).off
+    }
     return _plain({"shard_version": VERSION, "data": data, **parts})  # type: ignore[return-value]
 
 
@@ -153,9 +175,12 @@ def _plain(value: object) -> object:
 
 
 def _write_description(folder: Path, pairs: PairsConfig) -> None:
+    text = json.dumps(_description(pairs), indent=2, sort_keys=True) + "\n"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "dataset.json").write_text(json.dumps(_description(pairs), indent=2, sort_keys=True) + "\n")
+        temporary = partial_path(folder / "dataset.json", socket.gethostname(), os.getpid())
+        temporary.write_text(text)
+        temporary.replace(folder / "dataset.json")
     except OSError as error:
         raise UserError(
             f"paths.data={pairs.paths.data}: cannot be written ({error}); give another folder"

@@ -20,35 +20,30 @@ path                                    shape, type         meaning
 ======================================  ==================  ========================================================
 
 Every data set carries a Fletcher-32 checksum and the file's own structure is checksummed by HDF5's latest format, so
-damage is an error and not a wrong number. A shard appears under its name only when it is whole.
+damage is an error and not a wrong number. A shard appears under its name only when it is whole. Beside it lies the
+SHA-256 of the whole file (:func:`checksum_path`), as ``sha256sum`` writes it.
 """
 
 import json
-import os
-import socket
-from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from io import BytesIO
 from pathlib import Path
 from typing import Any, Self
 
 import h5py
-import hdf5plugin
+import hdf5plugin  # noqa: F401 (its filters decompress)
 import numpy as np
 from numpy.typing import NDArray
 from trimesh import Trimesh
 
+from stereo_occ.data.open_shards import forget, use
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.pose import Pose
 from stereo_occ.occupancy.pools import PointPool
-from stereo_occ.shapes.shape import Shape
 
 FORMAT = "stereo_occ.shard"
 VERSION = 1
 POOLS = ("box", "surface")
-POINTS_PER_CHUNK = 8192
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,92 +59,17 @@ class Views:
     unit: NDArray[np.float64] | None = None
 
 
-def write_shard(path: Path, shape: Shape, views: Views, pools: Mapping[str, PointPool]) -> None:
-    """Write a shard so that ``path`` is either absent or complete, whatever interrupts the writing.
-
-    Raises:
-        UserError: the disk is full or the folder cannot be written.
-    """
-    temporary = partial_path(path, socket.gethostname(), os.getpid())
-    image = _file_image(shape, views, pools)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("wb") as file:
-            file.write(image)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except OSError as error:
-        raise UserError(
-            f"{path}: cannot write the shard ({error}); free some disk space or set paths.data"
-        ) from error
-    finally:
-        with suppress(NotADirectoryError):
-            temporary.unlink(missing_ok=True)
-
-
-def _file_image(shape: Shape, views: Views, pools: Mapping[str, PointPool]) -> memoryview:
-    """The bytes of the file, made in memory: where a disk is full, HDF5 crashes instead of raising."""
-    image = BytesIO()
-    with h5py.File(image, "w", libver="latest", track_order=False) as file:
-        file.attrs["version"] = VERSION
-        for name, text in (
-            ("format", FORMAT),
-            ("category", shape.category),
-            ("object_id", shape.object_id),
-            ("facts", json.dumps(dict(shape.facts), sort_keys=True)),
-        ):
-            # Of fixed length: strings of variable length lie in a heap that HDF5 keeps without a checksum.
-            file.attrs[name] = np.bytes_(text.encode())
-        _write(file, "mesh/vertices", shape.mesh.vertices.astype(np.float32))
-        _write(file, "mesh/faces", shape.mesh.faces.astype(np.int32))
-        for name, array in vars(views).items():
-            if array is not None:
-                _write(file, f"views/{name}", array, chunk_length=1)
-        for name, pool in pools.items():
-            _write(file, f"points/{name}/grid", pool.grid_N3, chunk_length=POINTS_PER_CHUNK)
-            _write(file, f"points/{name}/bounds", np.stack([pool.low_3, pool.extent_3]))
-            _write(file, f"points/{name}/part", pool.part_N, chunk_length=POINTS_PER_CHUNK)
-    return image.getbuffer()
-
-
-def partial_path(path: Path, host: str, process: int) -> Path:
-    """Where a process writes a shard before it gets its name."""
-    return path.with_name(f".{path.name}.{host}.{process}.part")
-
-
-def remove_partial(folder: Path) -> None:
-    """Remove what killed processes of this machine left behind in the category folders of ``folder``."""
-    for partial in folder.glob("*/.*.part"):
-        _, process, _ = partial.name.rsplit(".", 2)
-        if f".{socket.gethostname()}.{process}." in partial.name and not _is_alive(int(process)):
-            partial.unlink(missing_ok=True)
-
-
-def _is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # another user's
-        return True
-    return True
-
-
-def _write(file: h5py.File, name: str, array: NDArray[Any], chunk_length: int | None = None) -> None:
-    length = len(array) if chunk_length is None else min(chunk_length, len(array))
-    file.create_dataset(
-        name,
-        data=array,
-        chunks=(length, *array.shape[1:]),
-        fletcher32=True,
-        track_times=False,
-        **hdf5plugin.Zstd(clevel=3),
-    )
+def checksum_path(path: Path) -> Path:
+    """Where the checksum of a shard is."""
+    return path.with_name(f"{path.name}.sha256")
 
 
 class Shard:
-    """A shard opened for reading. The file is opened at first use and stays open; :meth:`close` releases it."""
+    """A shard opened for reading.
+
+    The file is opened at first use and stays open with all that was read, until :meth:`close` or until a few hundred
+    other shards have been used since (:mod:`stereo_occ.data.open_shards`); the next use opens it again.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -176,6 +96,7 @@ class Shard:
         return {}
 
     def _dataset(self, name: str) -> h5py.Dataset:
+        use(self)
         try:
             if name not in self._opened:  # opening a data set takes longer than reading one view
                 self._opened[name] = self._file[name]
@@ -206,6 +127,7 @@ class Shard:
 
     def close(self) -> None:
         """Close the file; the next access opens it again."""
+        forget(self)
         if "_file" in vars(self):
             self._file.close()
         self.__dict__ = self.__getstate__()
@@ -245,20 +167,29 @@ class Shard:
         """Left and right depth ``(2, H, W)`` in metres; 0 is background."""
         return self._read("views/depth", view)
 
-    @cached_property
-    def cameras(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """``K (N, 2, 3, 3)`` and ``camera_from_rig (N, 2, 4, 4)`` of all views."""
-        return self._read("views/K"), self._read("views/camera_from_rig")
+    def cameras(self, view: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """``K (2, 3, 3)`` and ``camera_from_rig (2, 4, 4)``, left and right."""
+        return self._row("views/K", view), self._row("views/camera_from_rig", view)
+
+    def pose(self, view: int) -> Pose:
+        """The object's pose."""
+        return Pose.from_matrix(self._row("views/rig_from_object", view))
 
     @cached_property
-    def poses(self) -> list[Pose]:
-        """The object's pose in each view."""
-        return [Pose.from_matrix(matrix) for matrix in self._read("views/rig_from_object")]
+    def _rows(self) -> dict[str, tuple[NDArray[np.float64], NDArray[np.bool_]]]:
+        return {}
 
-    @cached_property
-    def unit_N(self) -> NDArray[np.float64]:
-        """Metres per unit of the rig frame in each view: what turns a reconstruction into metres."""
-        return self._read("views/unit") if "views/unit" in self._file else np.ones(len(self))
+    def _row(self, name: str, view: int) -> NDArray[np.float64]:
+        """One row of a small data set, read once: all of a thousand take a tenth of a second."""
+        if name not in self._rows:
+            dataset = self._dataset(name)
+            self._rows[name] = np.empty(dataset.shape), np.zeros(len(dataset), bool)
+        rows, known = self._rows[name]
+        if not known[view]:
+            rows[view] = self._read(name, view)
+            known[view] = True
+        row: NDArray[np.float64] = rows[view]
+        return row
 
     @cached_property
     def _pools(self) -> dict[str, PointPool]:

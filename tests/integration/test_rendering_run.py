@@ -14,7 +14,8 @@ from runs import program
 from stereo_occ.cli import compose_config
 from stereo_occ.data import prepare as prepare_module
 from stereo_occ.data.prepare import prepare
-from stereo_occ.data.shard import Shard, partial_path
+from stereo_occ.data.shard import Shard
+from stereo_occ.data.shard_writing import partial_path
 from stereo_occ.errors import UserError
 
 SMALL = [
@@ -112,9 +113,9 @@ def test_shards_show_the_object_where_the_pose_says(rendered):
     for path in rendered.rglob("*.h5"):
         with Shard(path) as shard:
             for view in range(len(shard)):
-                posed_N3 = shard.poses[view].to_rig(shard.mesh.vertices)
+                posed_N3 = shard.pose(view).to_rig(shard.mesh.vertices)
                 for side, mask, depth in zip((0, 1), shard.mask(view), shard.depth(view), strict=True):
-                    K, camera_from_rig = (array[view, side] for array in shard.cameras)
+                    K, camera_from_rig = (array[side] for array in shard.cameras(view))
                     camera_N3 = posed_N3 @ camera_from_rig[:3, :3].T + camera_from_rig[:3, 3]
                     pixels_N2 = (camera_N3 @ K.T)[:, :2] / camera_N3[:, 2:]
                     v, u = np.nonzero(mask > 0)

@@ -110,9 +110,9 @@ def test_images_and_cameras_are_those_of_the_shard(shards):
     assert views.left_BCHW.shape == (1, 3, SIDE, SIDE)
     np.testing.assert_allclose(views.left_BCHW[0].permute(1, 2, 0) * 255, left, atol=1e-4)
     np.testing.assert_allclose(views.right_BCHW[0].permute(1, 2, 0) * 255, right, atol=1e-4)
-    K, camera_from_rig = shards[1].cameras
-    np.testing.assert_allclose(views.K_B233[0], K[2], rtol=1e-6)
-    np.testing.assert_allclose(views.camera_from_rig_B244[0], camera_from_rig[2], atol=1e-6)
+    K, camera_from_rig = shards[1].cameras(2)
+    np.testing.assert_allclose(views.K_B233[0], K, rtol=1e-6)
+    np.testing.assert_allclose(views.camera_from_rig_B244[0], camera_from_rig, atol=1e-6)
     assert views.camera_from_rig_B244[0, 0, 0, 3] == 0  # the origin lies on the optical axis ...
     assert views.camera_from_rig_B244[0, 0, 2, 3] == 1  # ... one metre ahead
 
@@ -144,7 +144,7 @@ def in_posed_box(shard, pose: Pose, points_N3):
 
 
 def test_each_part_of_the_mix_lies_where_it_should(shards):
-    shard, pose = shards[0], shards[0].poses[1]
+    shard, pose = shards[0], shards[0].pose(1)
     mixes = {"box": (1.0, 0.0, 0.0), "outside": (0.0, 1.0, 0.0), "surface": (0.0, 0.0, 1.0)}
     points, occupied = {}, {}
     for name, shares in mixes.items():
@@ -171,7 +171,7 @@ def test_labels_are_those_of_the_posed_mesh(shards, queries):
         batch = EvaluationPairs(shards, range(3), 400).__getitems__(list(range(9)))
     for item, view in enumerate(batch.ids):
         shard = shards[item // 3]
-        posed = shard.mesh.apply_transform(shard.poses[view.view].rig_from_object)
+        posed = shard.mesh.apply_transform(shard.pose(view.view).rig_from_object)
         inside_N = contains(posed, batch.queries[queries].points_BN3[item].double().numpy())
         labels_N = batch.queries[queries].occupied_BN[item].numpy() > 0.5
         assert (inside_N != labels_N).mean() <= 0.005  # points within rounding of the surface
@@ -180,7 +180,7 @@ def test_labels_are_those_of_the_posed_mesh(shards, queries):
 
 def test_unposed_points_are_the_posed_ones_taken_back(shards):
     batch = EvaluationPairs(shards, range(3), 300).__getitems__([4])
-    pose = shards[1].poses[1]
+    pose = shards[1].pose(1)
     bbox, unposed = batch.queries["bbox"], batch.queries["unposed"]
     torch.testing.assert_close(unposed.occupied_BN, bbox.occupied_BN)
     np.testing.assert_allclose(
@@ -213,7 +213,7 @@ def truth(shards, batch, frame):
         rows = []
         for view, points_N3 in zip(batch.ids, queries.points_BN3.double().numpy(), strict=True):
             shard = next(s for s in shards if s.object_id == view.object_id)
-            pose = shard.poses[view.view]
+            pose = shard.pose(view.view)
             inside_N = contains(shard.mesh, pose.to_object(points_N3) if frame == "rig" else points_N3)
             rows.append(torch.where(torch.from_numpy(inside_N), 9.0, -9.0))
         logits[name] = torch.stack(rows)

@@ -13,16 +13,18 @@ import numpy as np
 import pytest
 from samples import pools_of, small_shard, solid, views_of
 
-from stereo_occ.data.shard import VERSION, Shard, partial_path, remove_partial, write_shard
+from stereo_occ.data.shard import VERSION, Shard, checksum_path
+from stereo_occ.data.shard_writing import partial_path, remove_partial, write_shard
 from stereo_occ.errors import UserError
 
 
 def contents(path):
     """Everything that a shard holds, as one comparable value."""
     with Shard(path) as shard:
-        arrays = [shard.mesh.vertices, shard.mesh.faces, *shard.cameras]
-        for view, pose in enumerate(shard.poses):
-            arrays += [shard.rgb(view), shard.mask(view), shard.depth(view), pose.rig_from_object]
+        arrays = [shard.mesh.vertices, shard.mesh.faces, *shard.cameras(0)]
+        for view in range(len(shard)):
+            arrays += [shard.rgb(view), shard.mask(view), shard.depth(view), shard.pose(view).rig_from_object]
+            arrays += shard.cameras(view)
         for name in ("box", "surface"):
             pool = shard.pool(name)
             arrays += [pool.grid_N3, pool.low_3, pool.extent_3, pool.part_N, pool.occupied_N]
@@ -46,11 +48,12 @@ def test_everything_comes_back(tmp_path):
             np.testing.assert_array_equal(shard.mask(view), views.mask[view])
             np.testing.assert_array_equal(shard.depth(view), views.depth[view])
             np.testing.assert_allclose(
-                shard.poses[view].rig_from_object, views.rig_from_object[view], atol=1e-15
+                shard.pose(view).rig_from_object, views.rig_from_object[view], atol=1e-15
             )
-        K, camera_from_rig = shard.cameras
-        np.testing.assert_array_equal(K, views.K)
-        np.testing.assert_array_equal(camera_from_rig, views.camera_from_rig)
+            for _ in range(2):  # read, then remembered
+                K, camera_from_rig = shard.cameras(view)
+                np.testing.assert_array_equal(K, views.K[view])
+                np.testing.assert_array_equal(camera_from_rig, views.camera_from_rig[view])
         for name, pool in pools.items():
             for field in ("grid_N3", "low_3", "extent_3", "occupied_N", "part_N", "points_N3"):
                 np.testing.assert_array_equal(getattr(shard.pool(name), field), getattr(pool, field))
@@ -178,7 +181,7 @@ def test_a_failed_write_leaves_nothing_new_behind(tmp_path, monkeypatch, failure
         with pytest.raises(raised):
             small_shard(tmp_path, object_id="pot")
     assert path.read_bytes() == before
-    assert [file.name for file in path.parent.iterdir()] == ["cup.h5"]
+    assert {file.name for file in path.parent.iterdir()} == {"cup.h5", "cup.h5.sha256"}
 
 
 FULL_DISK = """
@@ -227,4 +230,4 @@ def test_what_dead_processes_left_is_removed_and_the_rest_kept(tmp_path):
     for partial in (ours, left_behind, another_machines):
         partial.write_bytes(b"")
     remove_partial(tmp_path)
-    assert set(path.parent.iterdir()) == {path, ours, another_machines}
+    assert set(path.parent.iterdir()) == {path, checksum_path(path), ours, another_machines}
