@@ -158,9 +158,6 @@ def _description(pairs: PairsConfig) -> dict[str, object]:
         del parts["rig"]["kind"]
     if not parts["background"]["masked"]:
         del parts["background"]["masked"]
-    parts |= {name: asdict(group) for name in ("texture", "sensor") if not (group := getattr(pairs, name)).off}
-    if not parts["background"]["masked"]:
-        del parts["background"]["masked"]
     parts |= {
         name: asdict(group) for name in ("texture", "sensor") if not (group := getattr(pairs, name)).off
     }
