@@ -31,6 +31,10 @@ MODELS = {
         "model/encoder=resnet18",
         "model.encoder.weights=null",
     ],
+    "pixel_stereo": ["model=pixel_stereo"],
+    "plane_sweep_stereo": ["model=plane_sweep_stereo"],
+    "plane_sweep_stereo, stride 2": ["model=plane_sweep_stereo", "model.feature_stride=2"],
+    "plane_sweep_stereo, around the object": ["model=plane_sweep_stereo", "model.around=object"],
 }
 
 
