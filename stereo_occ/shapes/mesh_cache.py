@@ -129,8 +129,14 @@ def load(entry: Path, header_only: bool = False) -> Inspection:
 @cache
 def _code() -> str:
     """What a result depends on besides the file: the code of reading and repair, and the libraries they rest on."""
-    here = Path(__file__).parent
-    modules = ("reading.py", "surface_colors.py", "inspection.py", "quality.py", "repair/*.py")
-    parts = [path.read_bytes() for name in modules for path in sorted(here.glob(name))]
+    names = (
+        "reading.py",
+        "surface_colors.py",
+        "inspection.py",
+        "quality.py",
+        "repair/*.py",
+        "../occupancy/*.py",
+    )
+    parts = [path.read_bytes() for name in names for path in sorted(Path(__file__).parent.glob(name))]
     libraries = [version(name) for name in ("trimesh", "manifold3d", "numpy", "scipy")]
     return digest(b"".join([*parts, str(libraries + sorted(trimesh.available_formats())).encode()]))
