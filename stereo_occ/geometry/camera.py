@@ -13,6 +13,9 @@ from torch import Tensor
 
 from stereo_occ.errors import UserError
 
+#: How far rotations may be from orthonormal.
+RIGID_TOLERANCE = 2e-5
+
 Array = TypeVar("Array", NDArray[np.float64], NDArray[np.float32], Tensor)
 
 
@@ -144,15 +147,16 @@ def look_at_origin(angle: float, distance: float) -> NDArray[np.float64]:
 
 
 def check_rigid(matrix_44: NDArray[np.float64], name: str) -> None:
-    """Raise :class:`UserError` unless the 4x4 matrix is a rotation and a translation, to 1e-5."""
+    """Raise :class:`UserError` unless the 4x4 matrix is a rotation and a translation, to RIGID_TOLERANCE."""
     if matrix_44.shape != (4, 4) or not np.isfinite(matrix_44).all():
         raise UserError(
             f"{name}: must be a finite 4x4 matrix, got shape {matrix_44.shape}: {matrix_44.tolist()}"
         )
-    if not np.allclose(matrix_44[3], [0, 0, 0, 1], atol=1e-5):
+    if np.abs(matrix_44[3] - [0, 0, 0, 1]).max() > RIGID_TOLERANCE:
         raise UserError(f"{name}: the last row must be [0, 0, 0, 1], got {matrix_44[3].tolist()}")
     rotation = matrix_44[:3, :3]
-    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-5) or np.linalg.det(rotation) < 0:
+    error = np.abs(rotation @ rotation.T - np.eye(3)).max()
+    if error > RIGID_TOLERANCE or np.linalg.det(rotation) < 0:
         raise UserError(
             f"{name}: the upper left 3x3 block must be a rotation (orthonormal, determinant +1), "
             f"got {rotation.tolist()}"

@@ -5,12 +5,11 @@ hides more of it than is allowed.
 """
 
 from colorsys import hsv_to_rgb
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from omegaconf import MISSING
-from scipy.spatial.transform import Rotation
 
 from stereo_occ.geometry.camera import StereoRig
 from stereo_occ.geometry.pose import Pose
@@ -21,11 +20,17 @@ from stereo_occ.render.primitives import Solid, ball, box, cylinder, plane
 #: Things on the table; the shader's 16, less the object, the table and the wall.
 MAX_ON_TABLE = 12
 
+#: How many of the things shade the table where they stand; the object always does.
+SHADES = 5
+
 #: Sides of the table and the wall, diagonals of the object.
 EXTENT = 150.0
 
 #: Places tried for each thing.
 CANDIDATES = 12
+
+#: Tells the shader that things shade a surface where they stand.
+SHADED = np.array([0.0, 0.0, 0.0, -1.0])
 
 SOLIDS = (box, cylinder, ball)
 PATTERNS = (Pattern.stripes, Pattern.checks, Pattern.clouds, Pattern.clouds, Pattern.marble, Pattern.spots)
@@ -92,6 +97,7 @@ def draw_clutter(
     placed = _on_table(config, level, count, rng)
     solids = [_placed(plane(), np.eye(3), np.full(3, EXTENT * pose.scale), np.zeros(3)), wall, *placed]
     finishes = [_finish(config, pose.scale, rng) for _ in solids]
+    finishes[0] = replace(finishes[0], extra_4=SHADED)
     parts, offset = [], 0
     for number, ((positions_V3, normals_V3, faces_F3), finish) in enumerate(
         zip(solids, finishes, strict=True), start=1
@@ -115,7 +121,9 @@ def draw_clutter(
         )
         offset += len(positions_V3)
     vertices = np.concatenate([np.concatenate(columns, axis=1) for columns, _ in parts])
-    contacts_C4 = np.array([level.foot_4, *(_contact(positions_V3) for positions_V3, _, _ in placed)])
+    contacts_C4 = np.array(
+        [level.foot_4, *(_contact(positions_V3) for positions_V3, _, _ in placed[:SHADES])]
+    )
     contacts_C4[:, :3] = contacts_C4[:, :3] @ level.rig_from_level_33.T + level.origin_3
     return Clutter(
         vertices.astype(np.float32),
@@ -180,10 +188,10 @@ def _on_table(config: ClutterConfig, level: _Level, count: int, rng: np.random.G
         free_C &= _visible(
             level, places_C2, reach, sides_3[1], object_2, share(config.occlusion, f"{name}.occlusion")
         )
-        yaw = rng.uniform(0, 360)
+        yaw = rng.uniform(0, 2 * np.pi)
         if free_C.any():
             place_2 = places_C2[np.argmax(free_C)]
-            turn_33 = Rotation.from_euler("Y", yaw, degrees=True).as_matrix()
+            turn_33 = _about_y(yaw)
             solids.append(_placed(solid(), turn_33, sides_3, np.array([place_2[0], 0, place_2[1]])))
             taken.append((place_2, reach))
     return solids
@@ -223,8 +231,14 @@ def _visible(
 
 def _wall(config: ClutterConfig, diagonal: float, rng: np.random.Generator) -> Solid:
     distance = diagonal * draw_log(config.wall, "background.clutter.wall", rng, 0.5, EXTENT / 4)
-    turn = Rotation.from_euler("YX", [rng.uniform(-40, 40), 90], degrees=True).as_matrix()
-    return _placed(plane(), turn, np.full(3, EXTENT * diagonal), np.array([0, 0, -distance]))
+    upright_33 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # +Y to +Z
+    turn_33 = _about_y(np.radians(rng.uniform(-40, 40))) @ upright_33
+    return _placed(plane(), turn_33, np.full(3, EXTENT * diagonal), np.array([0, 0, -distance]))
+
+
+def _about_y(angle: float) -> NDArray[np.float64]:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
 
 
 def _placed(
@@ -249,7 +263,7 @@ def _finish(config: ClutterConfig, diagonal: float, rng: np.random.Generator) ->
     pattern = PATTERNS[int(rng.integers(len(PATTERNS)))]
     period = diagonal * draw_log(config.period, f"{name}.period", rng, 1e-3, 50)
     stretch_3 = np.where(rng.random(3) < 0.25, 0.15, 1.0)  # grain
-    turn_33 = Rotation.from_euler("Y", rng.uniform(0, 360), degrees=True).as_matrix()
+    turn_33 = _about_y(rng.uniform(0, 2 * np.pi))
     texture_from_level = np.eye(4)
     texture_from_level[:3, :3] = stretch_3[:, None] * turn_33 / period
     texture_from_level[:3, 3] = rng.uniform(0, 64, 3)
@@ -262,6 +276,5 @@ def _finish(config: ClutterConfig, diagonal: float, rng: np.random.Generator) ->
         pattern=pattern if patterned else Pattern.plain,
         warp=0.4 * likeness,
         level=0.3 + 0.4 * level,
-        extra_4=np.array([0.0, 0.0, 0.0, -1.0]),
         texture_from_object=texture_from_level,
     )

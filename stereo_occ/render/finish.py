@@ -32,7 +32,8 @@ class Finish:
         reflection: how strongly the surroundings are mirrored; 1 is a clean glaze.
         warp: how far the pattern is bent by noise, in periods.
         level: share of the second colour, or the height of a glaze's line.
-        extra_4: of a label: lower and upper edge, middle and half width in radians about +Y.
+        extra_4: of a label: lower and upper edge, middle and half width in radians about +Y. The last is below 0 for
+            what is shaded where things stand.
         texture_from_object: 4x4, from the object's frame to pattern space, whose unit is a period.
     """
 

@@ -38,6 +38,7 @@ class SurfaceDrawing:
         self._object, self._things = _VertexArray(), _VertexArray()
         self._no_vertices = GL.glGenVertexArrays(1)
         self._targets: dict[tuple[int, int], _Targets] = {}
+        self._places: dict[str, int] = {}
 
     def load_object(self, vertices_V14: NDArray[np.float32], faces_F3: NDArray[np.integer]) -> None:
         """The object, in its own frame."""
@@ -138,7 +139,9 @@ class SurfaceDrawing:
         GL.glActiveTexture(GL.GL_TEXTURE0)
 
     def _at(self, name: str) -> int:
-        return int(GL.glGetUniformLocation(self._light, name))
+        if name not in self._places:
+            self._places[name] = int(GL.glGetUniformLocation(self._light, name))
+        return self._places[name]
 
     @staticmethod
     def _make_current() -> None:
