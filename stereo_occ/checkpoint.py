@@ -1,7 +1,9 @@
 """Checkpoints: what they hold beyond Lightning's own state, and reading them without executing code."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
 from omegaconf import DictConfig, OmegaConf
@@ -10,7 +12,13 @@ from stereo_occ.config import TrainConfig
 from stereo_occ.data.rigs import build_rig
 from stereo_occ.errors import UserError
 from stereo_occ.models.build import build_model
-from stereo_occ.task import KEY, VERSION, OccupancyTask
+from stereo_occ.packaged import find_weights, read_weights
+
+if TYPE_CHECKING:
+    from stereo_occ.task import OccupancyTask
+
+#: Where a checkpoint has the configuration, and the version of its form.
+KEY, VERSION = "stereo_occ", 1
 
 
 def plain(cfg: DictConfig) -> dict[str, Any]:
@@ -26,6 +34,8 @@ def build_task(cfg: DictConfig, load_weights: bool = True) -> OccupancyTask:
     Args:
         load_weights: read pretrained weights where the encoder asks for them; not needed before a checkpoint is loaded.
     """
+    from stereo_occ.task import OccupancyTask  # Lightning, which takes seconds that only training needs
+
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
     rig = build_rig(typed.rig, typed.data.image_side)
@@ -35,18 +45,32 @@ def build_task(cfg: DictConfig, load_weights: bool = True) -> OccupancyTask:
 def read_checkpoint(path: Path) -> dict[str, Any]:
     """The contents of a checkpoint file; ``[KEY]["config"]`` is the training configuration.
 
+    Exported weights (``.safetensors``, or the name of some that are shipped) read as the checkpoint that they are of.
+
     Raises:
         UserError: the file is damaged, holds more than plain data, or is of another version.
     """
+    if (weights := find_weights(str(path))) is not None:
+        description, state_dict = read_weights(weights)
+        checkpoint: Any = {
+            KEY: {"version": description.get("version"), "config": description.get("config")},
+            "state_dict": state_dict,
+            "global_step": description.get("step"),
+        }
+        return _checked(checkpoint, path)
     try:
         checkpoint = torch.load(path, map_location="cpu", weights_only=True)
-    except OSError as error:
+    except (FileNotFoundError, PermissionError, IsADirectoryError) as error:
         raise UserError(f"checkpoint={path}: cannot be read ({error.strerror or error})") from error
     except Exception as error:  # torch's own message advises to execute what the file holds
         raise UserError(
             f"checkpoint={path}: is damaged, or holds more than tensors and plain values; "
             f"give the best.ckpt or last.ckpt of a training run"
         ) from error
+    return _checked(checkpoint, path)
+
+
+def _checked(checkpoint: Any, path: Path) -> dict[str, Any]:
     ours = checkpoint.get(KEY) if isinstance(checkpoint, dict) else None
     if not isinstance(ours, dict):
         raise UserError(

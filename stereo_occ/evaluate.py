@@ -12,7 +12,7 @@ from lightning.pytorch.callbacks import TQDMProgressBar
 from omegaconf import DictConfig, OmegaConf
 from PIL import Image
 
-from stereo_occ.checkpoint import build_task, read_checkpoint
+from stereo_occ.checkpoint import KEY, build_task, read_checkpoint
 from stereo_occ.checks import check_evaluation, check_pairs
 from stereo_occ.cli import entry_point
 from stereo_occ.config import EvaluateConfig, TrainConfig, training_config
@@ -24,7 +24,7 @@ from stereo_occ.metrics_file import environment, write_json
 from stereo_occ.pictures import comparison
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.reconstruction import reconstruct
-from stereo_occ.task import KEY, OccupancyTask
+from stereo_occ.task import OccupancyTask
 
 logger = logging.getLogger(__name__)
 

@@ -9,10 +9,9 @@ from lightning.fabric.plugins import TorchCheckpointIO
 from lightning.pytorch import LightningModule, Trainer
 from lightning.pytorch.callbacks import Checkpoint
 
-from stereo_occ.checkpoint import plain, read_checkpoint
+from stereo_occ.checkpoint import KEY, plain, read_checkpoint
 from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
-from stereo_occ.task import KEY
 
 #: What must not change between the parts of a run. Hardware, logging and the length of the run may.
 FIXED = (

@@ -8,14 +8,12 @@ from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
+from stereo_occ.checkpoint import KEY, VERSION
 from stereo_occ.config import TrainConfig
 from stereo_occ.data.batch import Batch
 from stereo_occ.metrics.scores import Scores
 from stereo_occ.models.base import OccupancyModel
 from stereo_occ.optimization import build_optimizer, build_schedule
-
-#: Where a checkpoint has the configuration, and the version of its form.
-KEY, VERSION = "stereo_occ", 1
 
 
 class OccupancyTask(lightning.LightningModule):

@@ -1,0 +1,158 @@
+"""Photographs: reading any image file, and what another camera at the same place would have taken."""
+
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageOps, UnidentifiedImageError
+from scipy.ndimage import map_coordinates
+
+from stereo_occ.calibration import RealCamera
+from stereo_occ.errors import UserError
+from stereo_occ.geometry.camera import Camera
+
+#: Largest values of the grey levels that cameras deliver in 16 bits.
+DEPTHS = tuple(2**bits - 1 for bits in (8, 10, 12, 14, 16))
+
+#: Transparency above this is object.
+OPAQUE = 128
+
+#: Samples per pixel and axis, at most; wider pixels are averaged before.
+SAMPLES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Photo:
+    """An image as a camera took it.
+
+    Attributes:
+        rgb_HW3: display values.
+        mask_HW: where the object is, if the file says so by its transparency.
+    """
+
+    rgb_HW3: NDArray[np.uint8]
+    mask_HW: NDArray[np.bool_] | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width, height in pixels."""
+        return self.rgb_HW3.shape[1], self.rgb_HW3.shape[0]
+
+
+def read_photo(path: Path, name: str) -> Photo:
+    """Any image file that Pillow reads: grey, palette, RGB, RGBA; 8 or 16 bits; turned as its EXIF tag says.
+
+    Args:
+        name: of the setting that gives the path, for messages.
+
+    Raises:
+        UserError: if there is no such file, or it is no image.
+    """
+    image = _open(path, name)
+    alpha = image.getchannel("A") if "A" in image.getbands() or "transparency" in image.info else None
+    if image.mode.startswith(("I", "F")):
+        rgb_HW3 = np.repeat(_to_bytes(np.asarray(image))[..., None], 3, axis=2)
+        return Photo(rgb_HW3)
+    if "transparency" in image.info and alpha is None:
+        alpha = image.convert("RGBA").getchannel("A")
+    mask_HW = None if alpha is None else np.asarray(alpha) >= OPAQUE
+    if mask_HW is not None and mask_HW.all():
+        mask_HW = None
+    return Photo(np.asarray(image.convert("RGB")), mask_HW)
+
+
+def read_mask(path: Path, name: str, size: tuple[int, int]) -> NDArray[np.bool_]:
+    """A mask ``(H, W)`` of a photograph of this width and height: what is not black, or not transparent.
+
+    Raises:
+        UserError: as :func:`read_photo`; if the size differs, or nothing or all of it is object.
+    """
+    photo = read_photo(path, name)
+    mask_HW = photo.rgb_HW3.max(axis=2) > 0 if photo.mask_HW is None else photo.mask_HW
+    if photo.size != size:
+        raise UserError(
+            f"{name}={path}: has {photo.size[0]} x {photo.size[1]} pixels, its image {size[0]} x {size[1]}"
+        )
+    if not mask_HW.any() or mask_HW.all():
+        what = "is empty" if not mask_HW.any() else "covers the whole image"
+        raise UserError(f"{name}={path}: {what}; the object must be white on black")
+    return mask_HW
+
+
+def seen_by(
+    image_HWC: NDArray[np.uint8], camera: RealCamera, target: Camera, outside: float | None = None
+) -> NDArray[np.float32]:
+    """What ``target``, at the place of ``camera``, would have taken: ``(H, W, C)`` of 0 to 255, area-averaged.
+
+    Crop, rectification and removal of distortion in one step. A pixel is the mean of samples on a grid in it, each
+    interpolated in the image (reduced before, if it is much finer).
+
+    Args:
+        image_HWC: taken by ``camera``.
+        target: its rig frame is the left camera's.
+        outside: value beyond the edges of the image; None: the edge's own.
+    """
+    ray_corners_43 = _rays(target, _corners(target)) @ _turn(camera, target).T
+    reach = camera.pixels_along(ray_corners_43)
+    extent = np.ptp(reach, axis=0) / [target.width, target.height]
+    scale = float(extent.max())
+    factor = max(1, int(scale // SAMPLES))
+    per_axis = min(SAMPLES, max(1, ceil(scale / factor)))
+    offsets = (np.arange(per_axis) + 0.5) / per_axis - 0.5
+    u = (np.arange(target.width)[:, None] + offsets).ravel()
+    v = (np.arange(target.height)[:, None] + offsets).ravel()
+    grid_N2 = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    source_N2 = camera.pixels_along(_rays(target, grid_N2) @ _turn(camera, target).T)
+    source_N2 = (source_N2 + 0.5) / factor - 0.5
+    mode, fill = ("nearest", 0.0) if outside is None else ("constant", outside)
+    channels = []
+    for channel in np.moveaxis(image_HWC, 2, 0):
+        reduced = Image.fromarray(channel).reduce(factor) if factor > 1 else channel
+        samples_N = map_coordinates(
+            np.asarray(reduced, dtype=np.float32), source_N2.T[::-1], order=1, mode=mode, cval=fill
+        )
+        samples = samples_N.reshape(target.height, per_axis, target.width, per_axis)
+        channels.append(samples.mean(axis=(1, 3)))
+    return np.stack(channels, axis=-1)
+
+
+def _turn(camera: RealCamera, target: Camera) -> NDArray[np.float64]:
+    """Rotation from the target's axes to the camera's."""
+    return np.asarray(camera.rotation_33 @ target.camera_from_rig[:3, :3].T)
+
+
+def _rays(target: Camera, pixels_N2: NDArray[np.float64]) -> NDArray[np.float64]:
+    homogeneous_N3 = np.concatenate([pixels_N2, np.ones_like(pixels_N2[:, :1])], axis=1)
+    return np.asarray(homogeneous_N3 @ np.linalg.inv(target.K).T)
+
+
+def _corners(target: Camera) -> NDArray[np.float64]:
+    right, bottom = target.width - 0.5, target.height - 0.5
+    return np.array([[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]])
+
+
+def _to_bytes(values_HW: NDArray[np.generic]) -> NDArray[np.uint8]:
+    """Of 10, 12, 14 or 16 bits whichever the largest value needs; fractions are of 1."""
+    values = np.nan_to_num(values_HW.astype(np.float64))
+    peak = values.max(initial=0)
+    if values_HW.dtype.kind == "f" and peak <= 1:
+        full = 1.0
+    else:
+        full = next((depth for depth in DEPTHS if peak <= depth), peak)
+    return np.rint(255 * values.clip(0) / full).astype(np.uint8)
+
+
+def _open(path: Path, name: str) -> Image.Image:
+    try:
+        with Image.open(path) as image:
+            image.load()
+            return ImageOps.exif_transpose(image)
+    except FileNotFoundError as error:
+        raise UserError(f"{name}={path}: no such file") from error
+    except UnidentifiedImageError as error:
+        raise UserError(f"{name}={path}: is no image; give PNG, JPEG, TIFF, BMP, WebP or PGM") from error
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        reason = " ".join(str(error).split())
+        raise UserError(f"{name}={path}: cannot be read ({reason})") from error
