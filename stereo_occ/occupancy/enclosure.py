@@ -24,16 +24,16 @@ def encloses(mesh: Trimesh, points_N3: NDArray[np.floating], count: int = 65) ->
     return enclosed_N
 
 
-def overlap(mesh: Trimesh, count: int = 20_000) -> float:
+def overlap(mesh: Trimesh, rays: RayMeshIntersector, count: int = 20_000) -> float:
     """Share of the box's points about which parity and winding number of the closed mesh disagree.
 
-    They do where parts of a surface overlap or are turned inside out.
+    They do where parts of a surface overlap or are turned inside out. ``rays`` are those of the mesh.
     """
     low_3, high_3 = mesh.bounds
     plastic_3 = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])  # the R3 sequence
     points_N3 = low_3 + (high_3 - low_3) * (np.arange(1, count + 1)[:, None] * plastic_3 % 1)
     direction_N3 = np.broadcast_to(directions(1000)[321], points_N3.shape)
-    exits_N, crossings_N = _crossings(mesh, RayMeshIntersector(mesh), points_N3, direction_N3)
+    exits_N, crossings_N = _crossings(mesh, rays, points_N3, direction_N3)
     return float(((exits_N > 0.5) != (crossings_N % 2 == 1)).mean())
 
 

@@ -115,3 +115,67 @@ def test_what_has_no_inside_is_refused():
         contains(inverted, np.zeros((1, 3)))
     with pytest.raises(UserError, match="got 1 that are not"):
         contains(mesh, np.array([[0, 0, 0], [np.nan, 0, 0]]))
+
+
+def prism(radius, low, high, sections=24):
+    """A convex prism around the z-axis."""
+    mesh = trimesh.creation.cylinder(radius, high - low, sections=sections)
+    return mesh.apply_translation([0, 0, (low + high) / 2])
+
+
+def check_composed(mesh, convex, inside):
+    """Labels where no convex part's surface is nearer than 1e-4; ``inside`` composes the parts' own labels."""
+    points_N3 = near_and_far_points(mesh, 40_000, seed=5)
+    depth_KN = np.stack([convex_depth(part, points_N3) for part in convex])
+    clear_N = (np.abs(depth_KN) > 1e-4 * mesh.scale).all(axis=0)
+    assert clear_N.mean() > 0.5
+    wrong_N = contains(mesh, points_N3[clear_N]) != inside(*(depth_KN[:, clear_N] > 0))
+    assert wrong_N.sum() == 0
+
+
+def test_a_hollow_mug_with_a_handle():
+    body, cavity = prism(0.4, 0, 1), prism(0.35, 0.05, 1.2)
+    grip = trimesh.creation.box((0.5, 0.08, 0.6)).apply_translation([0.45, 0, 0.5])
+    loop = trimesh.creation.box((0.4, 0.3, 0.5)).apply_translation([0.45, 0, 0.5])
+    union, difference = trimesh.boolean.union, trimesh.boolean.difference
+    mug = difference([union([body, difference([grip, loop])]), cavity])
+    assert mug.euler_number == 0
+    check_composed(mug, [body, cavity, grip, loop], lambda b, c, g, o: (b | (g & ~o)) & ~c)
+
+
+def test_a_bowl():
+    outer, inner = (trimesh.creation.icosphere(subdivisions=2, radius=radius) for radius in (1, 0.97))
+    lid = trimesh.creation.box((3, 3, 2)).apply_translation([0, 0, 1.2])
+    bowl = trimesh.boolean.difference([outer, inner, lid])
+    check_composed(bowl, [outer, inner, lid], lambda o, i, above: o & ~i & ~above)
+
+
+def test_a_bottle_with_an_inner_void():
+    body, neck = prism(0.3, 0, 1), prism(0.1, 0.9, 1.4)
+    void, channel = prism(0.28, 0.02, 0.98), prism(0.08, 0.9, 1.35)
+    union = trimesh.boolean.union
+    bottle = trimesh.boolean.difference([union([body, neck]), union([void, channel])])
+    assert bottle.body_count == 2
+    check_composed(bottle, [body, neck, void, channel], lambda b, n, v, c: (b | n) & ~v & ~c)
+
+
+def test_nested_shells():
+    balls = [trimesh.creation.icosphere(subdivisions=2, radius=radius) for radius in (1, 0.95, 0.5, 0.48)]
+    shells = trimesh.util.concatenate([hollow(*balls[:2]), hollow(*balls[2:])])
+    check_composed(shells, balls, lambda a, b, c, d: (a & ~b) | (c & ~d))
+
+
+def test_an_overlap_of_two_parts_wound_alike_is_solid_from_every_side():
+    cross = trimesh.util.concatenate([prism(0.2, -1, 1), trimesh.creation.box((2, 0.2, 0.2))])
+    parts = cross.split()
+    check_composed(cross, list(parts), lambda a, b: a | b)
+
+
+def test_far_from_the_origin():
+    mesh = hollow(trimesh.creation.box((1, 1, 1)), trimesh.creation.box((0.98, 0.98, 0.98)))
+    points_N3 = near_and_far_points(mesh, 10_000, seed=6)
+    moved = mesh.copy().apply_translation([3000, -2000, 1000])
+    reach_N = np.abs(points_N3).max(axis=1)
+    clear_N = (np.abs(reach_N - 0.5) > 1e-4) & (np.abs(reach_N - 0.49) > 1e-4)
+    inside_N = contains(moved, points_N3[clear_N] + [3000, -2000, 1000])
+    np.testing.assert_array_equal(inside_N, ((reach_N < 0.5) & (reach_N > 0.49))[clear_N])

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from trimesh import Trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from stereo_occ.errors import UserError
 from stereo_occ.occupancy.enclosure import overlap
@@ -61,7 +62,9 @@ def repair(mesh: Trimesh) -> Repair:
         raise UserError("has no triangle with three different corners")
     to_unit = _Frame(welded)
     unit = source = to_unit(welded)
-    if not (_is_sound(unit) and unit.body_count == 1 and overlap(unit) <= MAX_OVERLAP):
+    if not (
+        _is_sound(unit) and unit.body_count == 1 and overlap(unit, RayMeshIntersector(unit)) <= MAX_OVERLAP
+    ):
         unit, source, more = _solid(unit)
         if more:
             steps += more
@@ -83,7 +86,11 @@ def _solid(unit: Trimesh) -> tuple[Trimesh, Trimesh, list[str]]:
     if tolerance:
         steps.append(f"welded vertices {tolerance:g} of the diagonal apart")
     assembly, done = assemble(unit)
-    if assembly is not None and _is_sound(assembly.solid) and overlap(assembly.solid) <= MAX_OVERLAP:
+    if (
+        assembly is not None
+        and _is_sound(assembly.solid)
+        and overlap(assembly.solid, RayMeshIntersector(assembly.solid)) <= MAX_OVERLAP
+    ):
         return (assembly.solid if done else unit), assembly.source, steps + done
     solid, sheet = wrap(unit)
     steps.append("wrapped")
@@ -108,7 +115,9 @@ class _Frame:
 
 
 def _is_sound(mesh: Trimesh) -> bool:
-    return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 1e-9)
+    """Whether the mesh is a solid that hardly overlaps itself."""
+    closed = mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 1e-9
+    return bool(closed and overlap(mesh, RayMeshIntersector(mesh)) <= MAX_OVERLAP)
 
 
 def _check(mesh: Trimesh) -> None:
@@ -120,10 +129,12 @@ def _check(mesh: Trimesh) -> None:
     used_3 = np.asarray(mesh.triangles).reshape(-1, 3)
     if not np.isfinite(used_3).all():
         raise UserError("has vertices that are not finite numbers")
-    extents_3 = np.ptp(used_3, axis=0)
+    extents_3, largest = np.ptp(used_3, axis=0), np.abs(used_3).max()
+    if largest > 1e100 or extents_3.max() <= 1e-6 * largest:
+        raise UserError(
+            f"has no shape that its numbers can hold: extent {extents_3.max():.3g}, coordinates up to {largest:.3g}"
+        )
     diagonal = float(np.linalg.norm(extents_3))
-    if not np.isfinite(diagonal) or diagonal <= 1e-6 * np.abs(used_3).max():
-        raise UserError(f"has no extent that numbers of its size can hold (diagonal {diagonal:.3g})")
     if extents_3.min() < FLAT * diagonal:
         raise UserError(
             f"encloses no volume: it is flat, {extents_3.min():.3g} in a box of diagonal {diagonal:.3g}"

@@ -46,10 +46,9 @@ def wrap(mesh: Trimesh) -> tuple[Trimesh, float]:
     distance[near] = distance_N.clip(max=2 * reach)
     empty = _empty(mesh, distance > reach, low_3, cell)
     depth = _depth(np.where((distance > reach) & ~empty, 0, distance), empty, reach, cell)
-    sheet_S = _free_on_both_sides(mesh, surface, empty, low_3, cell)
-    depth[near] = np.maximum(
-        depth[near], np.where(sheet_S[nearest_N], half_sheet - distance_N, -np.inf).clip(max=reach)
-    )
+    sheet_S = _without_thickness(mesh, surface, empty, low_3, cell)
+    thick_N = np.where(sheet_S[nearest_N], half_sheet - distance_N, -reach).clip(max=reach)
+    depth[near] = np.maximum(depth[near], thick_N)
     return _extract(depth, low_3, cell), float(sheet_S.mean())
 
 
@@ -87,16 +86,24 @@ def _depth(
     return depth
 
 
-def _free_on_both_sides(
+def _without_thickness(
     mesh: Trimesh, surface: Surface, empty: NDArray[np.bool_], low_3: NDArray[np.float64], cell: float
 ) -> NDArray[np.bool_]:
-    """Which of the surface's points have empty space before and behind them."""
+    """Which of the surface's points have empty space before and behind them, or lie beside such points.
+
+    The others are there for edges, where one sheet stands in the space before another.
+    """
     offset_S3 = (REACH + 1.2) * cell * mesh.face_normals[surface.face_S]
     free_S = np.ones(len(offset_S3), bool)
     for side in (-1, 1):
         cell_S3 = np.rint((surface.points_S3 + side * offset_S3 - low_3) / cell).astype(int)
         free_S &= empty[tuple(cell_S3.clip(0, np.array(empty.shape) - 1).T)]
-    return free_S
+    if not free_S.any():
+        return free_S
+    tree = cKDTree(surface.points_S3[free_S])
+    distance_S, _ = tree.query(surface.points_S3, distance_upper_bound=(REACH + 2.5) * cell)
+    beside_S: NDArray[np.bool_] = np.isfinite(distance_S)
+    return beside_S
 
 
 def _extract(depth: NDArray[np.float64], low_3: NDArray[np.float64], cell: float) -> Trimesh:
