@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 DEMO := outputs/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint types check tensorboard results figures lock clean
+.PHONY: help setup demo test lint types check tensorboard results contact-sheets figures lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -47,6 +47,9 @@ tensorboard: $(READY) ## open the dashboards of every run under outputs/
 
 results: $(READY) ## the README's table and figures from the files under experiments/
 	$(RUN)/python experiments/results.py
+
+contact-sheets: $(READY) ## one picture per group of variations, in experiments/variation
+	$(RUN)/python experiments/variation/contact_sheets.py
 
 figures: $(READY) ## the contact sheet of procedural objects
 	$(RUN)/python experiments/objects/contact_sheet.py

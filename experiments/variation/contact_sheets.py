@@ -54,7 +54,7 @@ def main() -> None:
         for name in options.names:
             overrides, rigs = SHEETS[name]
             sheet = contact_sheet(overrides, rigs, renderer)
-            sheet.save(options.folder / f"{name}.png", optimize=True)
+            sheet.quantize(256).save(options.folder / f"{name}.png", optimize=True)
 
 
 def contact_sheet(overrides: list[str], rigs: bool, renderer: StereoRenderer) -> Image.Image:
