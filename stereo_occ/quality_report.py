@@ -65,7 +65,7 @@ def _write_table(path: Path, records: Sequence[MeshRecord], root: Path) -> None:
             mesh_file, outcome = record.file, record.outcome
             names = (mesh_file.path.relative_to(root).as_posix(), mesh_file.category, mesh_file.object_id)
             texts = (mesh_file.subset, outcome.status, "; ".join(outcome.steps), outcome.reason)
-            measures = {name: f"{value:.4g}" for name, value in outcome.measures.items()}
+            measures = {name: f"{round(value, 6):g}" for name, value in outcome.measures.items()}
             writer.writerow(dict(zip(head, (*names, *texts), strict=True)) | measures)
 
 
