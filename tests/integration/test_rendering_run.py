@@ -2,8 +2,12 @@
 
 import json
 import os
+import shutil
 import signal
 import socket
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -13,6 +17,7 @@ from runs import program
 
 from stereo_occ.cli import compose_config
 from stereo_occ.data import prepare as prepare_module
+from stereo_occ.data.config import SliceConfig
 from stereo_occ.data.prepare import prepare
 from stereo_occ.data.shard import Shard
 from stereo_occ.data.shard_writing import partial_path
@@ -143,6 +148,54 @@ def test_a_mesh_that_changed_is_rendered_again(tmp_path):
             ratios.append(shard.mesh.extents.max() / shard.mesh.extents.min())
     assert ratios == pytest.approx([2, 2, 5])
     assert len(contents(tmp_path)) == 2
+
+
+def test_slices_are_the_whole_and_share_a_folder(rendered, tmp_path):
+    parts = []
+    for index in (2, 1, 3):
+        cfg = compose_config("render", [*SMALL, f"paths.data={tmp_path}", "workers=1"])
+        typed = OmegaConf.to_object(cfg)
+        parts.append(prepare(typed, progress=False, part=SliceConfig(index, 3)).paths)
+    assert sorted(map(len, parts)) == [1, 1, 2]
+    assert contents(tmp_path) == contents(rendered)
+
+
+def test_killed_at_any_moment_it_goes_on_to_the_same_bytes(rendered, tmp_path):
+    arguments = [sys.executable, "-m", "stereo_occ.render", *SMALL, f"paths.data={tmp_path}", "workers=2"]
+    process = subprocess.Popen(
+        arguments, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+    while not contents(tmp_path) and process.poll() is None:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    first = times(tmp_path)
+    assert first
+    render(tmp_path, workers=2)
+    assert contents(tmp_path) == contents(rendered)
+    assert {path: time for path, time in times(tmp_path).items() if path in first} == first
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_verify_names_what_is_damaged_or_missing_and_exits_with_1(rendered, tmp_path):
+    shutil.copytree(rendered, tmp_path / "data")
+    arguments = ["-m", "stereo_occ.render", *SMALL, "paths.data=data", "verify=true"]
+    done = program(*arguments, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "all 4 shards in data/" in done.stdout
+    damaged, missing, *_ = sorted((tmp_path / "data").rglob("*.h5"))
+    with damaged.open("r+b") as file:
+        file.truncate(1000)
+    missing.unlink()
+    done = program(*arguments, cwd=tmp_path)
+    assert done.returncode == 1
+    *found, verdict = done.stderr.splitlines()
+    assert found == [
+        f"damaged {damaged.relative_to(tmp_path)}: the file differs from its checksum",
+        f"missing {missing.relative_to(tmp_path)}",
+    ]
+    assert verdict.startswith("stereo_occ: of 4 shards 1 are damaged and 1 missing; delete the damaged files")
+    assert "Error" not in done.stdout + done.stderr
 
 
 def test_a_killed_rendering_process_is_one_line(tmp_path, monkeypatch):
