@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ def check_look(
     appearance = draw_appearance(lights, material, background, rng)
     rig = toed_in_rig(1.0, 0.2, 1.0, 8)
     scene = Scene(rig, rig, Pose(np.eye(3), 1.0, np.zeros(3)))
-    corners_83 = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) / 3**0.5
+    corners_83 = np.array(list(product((-0.5, 0.5), repeat=3))) / 3**0.5
     dressed(appearance, texture, background, scene, corners_83, False, [rng, rng])
     for name, limits in LIMITS.items():
         bounds(getattr(sensor, name), f"sensor.{name}", *limits)

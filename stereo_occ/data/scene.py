@@ -74,8 +74,8 @@ def draw_scene(
         scene = Scene(rig, rig, draw_pose(placement.kind.value, (low, high), rig, rng))
         if placement.standing is None:
             return scene
-        rotation_33, up_3 = draw_standing(placement.standing, spare)
-        return replace(scene, pose=replace(scene.pose, rotation_33=rotation_33), up_3=up_3)
+        turned_33, upwards_3 = draw_standing(placement.standing, spare)
+        return replace(scene, pose=replace(scene.pose, rotation_33=turned_33), up_3=upwards_3)
     rotation_33, size = random_rotations(1, rng)[0], rng.random()
     attempt = _attempt(config, placement, side, hull_N3, size)
     up_3: NDArray[np.float64] | None = None

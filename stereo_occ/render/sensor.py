@@ -120,7 +120,7 @@ def _falloff(K_33: NDArray[np.float64], height: int, width: int) -> NDArray[np.f
     """cos^4 of the angle between each pixel's ray and the optical axis ``(H, W)``; crops know where they were."""
     x_W = (np.arange(width) - K_33[0, 2]) / K_33[0, 0]
     y_H = (np.arange(height) - K_33[1, 2]) / K_33[1, 1]
-    return ((1 + x_W**2 + y_H[:, None] ** 2) ** -2.0).astype(np.float32)
+    return np.asarray((1 + x_W**2 + y_H[:, None] ** 2) ** -2.0, np.float32)
 
 
 def _soften(picture_HW3: NDArray[np.float32], sigma: float) -> None:
