@@ -4,7 +4,7 @@ import functools
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from importlib.util import find_spec
 from pathlib import Path
@@ -34,13 +34,16 @@ warnings.filterwarnings("ignore", r"\s*'hydra/launcher/\w+' is validated against
 
 
 def entry_point(
-    config_name: str, check: Check
+    config_name: str, check: Check, aliases: Mapping[str, str] | None = None
 ) -> Callable[[Callable[[DictConfig], None]], Callable[[], None]]:
     """Turn ``task(cfg)`` into a command line program configured by ``conf/<config_name>.yaml``.
 
     Every problem of the configuration ends the program before it starts, with one line each on standard error and
     exit code 2. So does a :class:`UserError` of the task; of a sweep the other jobs still run, in this process or where
     a launcher runs them.
+
+    Args:
+        aliases: other names of keys, for those that have the name of a group.
     """
 
     def decorate(task: Callable[[DictConfig], None]) -> Callable[[], None]:
@@ -63,6 +66,7 @@ def entry_point(
         )
 
         def main() -> None:
+            sys.argv[1:] = [_by_key(argument, aliases or {}) for argument in sys.argv[1:]]
             arguments = get_args_parser().parse_args()
             if not any(getattr(arguments, name) for name in ONLY_SHOWS):
                 problems = _missing_launchers(arguments.overrides) or find_problems(
@@ -101,6 +105,11 @@ def compose_config(config_name: str, overrides: Sequence[str] = ()) -> DictConfi
     if problems:
         raise UserError("; ".join(problems))
     return composed[0]
+
+
+def _by_key(argument: str, aliases: Mapping[str, str]) -> str:
+    key, equals, value = argument.partition("=")
+    return f"{aliases[key]}={value}" if equals and key in aliases else argument
 
 
 def _runs_elsewhere() -> bool:

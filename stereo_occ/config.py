@@ -11,10 +11,12 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from stereo_occ.baselines.config import BASELINE_SCHEMAS
 from stereo_occ.data.config import DATA_SCHEMAS, DataConfig, SliceConfig
 from stereo_occ.data.placement import PlacementConfig
 from stereo_occ.data.rigs import RIG_SCHEMAS, RigConfig, ToedInRigConfig
 from stereo_occ.errors import UserError
+from stereo_occ.inference_config import ExportConfig, ReconstructConfig
 from stereo_occ.models.config import register_schemas as register_model_schemas
 from stereo_occ.render.appearance import BackgroundConfig, LightsConfig, MaterialConfig
 from stereo_occ.render.sensor import SensorConfig
@@ -167,13 +169,17 @@ class TrainConfig(PairsConfig):
 class EvaluateConfig:
     """``python -m stereo_occ.evaluate``; what is null is taken from the checkpoint."""
 
-    checkpoint: str = MISSING
-    subset: str = MISSING  # train, val, test, all; auto: all of other meshes than the checkpoint's, else test
+    checkpoint: str | None = None  # of the network to measure; with a baseline, of the run whose data is meant
+    baseline: Any = None  # measured in place of a network
+    training: list[str] = MISSING  # without a checkpoint: overrides of train.yaml that name the training data
+    subset: str = MISSING  # train, val, test, all; auto: all of other meshes than the training's, else test
     views: int = MISSING  # poses per object
     points: int = MISSING  # per view and metric
     batch_size: int = MISSING  # views per forward pass
+    meshes: int = MISSING  # poses per object whose mesh is measured; 0: none
+    mesh_resolution: int = MISSING  # cells per side of the cube
+    surface_points: int = MISSING  # on each surface
     examples: int = MISSING  # meshes and pictures per category
-    mesh_resolution: int = MISSING
     data: Any = None
     rig: Any = None
     placement: Any = None
@@ -235,6 +241,8 @@ def register_schemas() -> None:
         ("render", RenderConfig),
         ("inspect", InspectConfig),
         ("evaluate", EvaluateConfig),
+        ("reconstruct", ReconstructConfig),
+        ("export", ExportConfig),
     ):
         store.store(name=f"base_{name}", node=root)
     for group, schema in (
@@ -258,6 +266,8 @@ def register_schemas() -> None:
         store.store(group=group, name=f"base_{group}", node=schema)
     for name, data_schema in DATA_SCHEMAS.items():
         store.store(group="data", name=f"base_{name}", node=data_schema)
+    for name, baseline_schema in BASELINE_SCHEMAS.items():
+        store.store(group="baseline", name=f"base_{name}", node=baseline_schema)
     for kind, rig_schema in RIG_SCHEMAS.items():
         store.store(group="rig", name=f"base_{kind}_rig", node=rig_schema)
     register_model_schemas(store)

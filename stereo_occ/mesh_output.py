@@ -1,0 +1,62 @@
+"""Finished meshes: fewer faces where the surface is flat, and files."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from manifold3d import Error, Manifold, Mesh64
+from trimesh import Trimesh
+
+from stereo_occ.errors import UserError
+
+#: Endings of the files that can be written.
+FORMATS = (".glb", ".obj", ".ply", ".stl")
+
+
+def simplified(mesh: Trimesh, tolerance: float) -> Trimesh:
+    """Fewer faces, the surface nowhere farther than ``tolerance`` from where it was; closed as before.
+
+    Edges are collapsed by manifold3d, which keeps a closed surface closed. A mesh that it does not take is returned
+    as it is.
+    """
+    solid = Manifold(Mesh64(np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.uint64)))
+    if solid.status() != Error.NoError or solid.is_empty():
+        return mesh
+    simple = solid.simplify(tolerance).to_mesh64()
+    result = Trimesh(
+        np.asarray(simple.vert_properties)[:, :3], simple.tri_verts.astype(np.int64), process=False
+    )
+    return result if len(result.faces) and result.is_volume else mesh
+
+
+def write_mesh(mesh: Trimesh, path: Path) -> None:
+    """Write GLB, OBJ, PLY or STL, with normals and colours where the format has them; whole or not at all.
+
+    Raises:
+        UserError: the folder cannot be written.
+    """
+    kind = path.suffix.lower().lstrip(".")
+    options: dict[str, Any] = {
+        "glb": {"include_normals": True},
+        "obj": {"include_normals": True},
+        "ply": {"vertex_normal": True},
+    }
+    data = mesh.export(file_type=kind, **options.get(kind, {}))
+    write_whole(path, data if isinstance(data, bytes) else str(data).encode())
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file whole or not at all.
+
+    Raises:
+        UserError: it cannot be written.
+    """
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_bytes(data)
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise UserError(f"output={path}: cannot be written ({error.strerror or error})") from error

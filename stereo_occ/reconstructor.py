@@ -1,0 +1,338 @@
+"""A mesh in metres from one's own calibrated pair."""
+
+import logging
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from trimesh import Trimesh
+from trimesh.visual import ColorVisuals
+
+from stereo_occ.calibration import RealPair, read_calibration
+from stereo_occ.config import TrainConfig
+from stereo_occ.data.rigs import RectifiedRigConfig
+from stereo_occ.errors import UserError
+from stereo_occ.geometry.camera import transform_points
+from stereo_occ.mesh_output import simplified
+from stereo_occ.models.base import StereoViews
+from stereo_occ.photographs.color import vertex_colors
+from stereo_occ.photographs.framing import Framing, frame_on_fixation, frame_on_object
+from stereo_occ.photographs.locate import Found, in_box, in_mask, on_plain_background
+from stereo_occ.photographs.outline import preview
+from stereo_occ.photographs.photo import Photo, read_mask, read_photo, seen_by
+from stereo_occ.reconstruction import expected_iou, sample_cube
+from stereo_occ.trained import Predictor, TrainedModel, load_trained
+
+logger = logging.getLogger(__name__)
+
+SIDES = ("left", "right")
+
+Pair = tuple[Any, Any]
+ImageFile = str | Path | NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class SurfaceOptions:
+    """How the surface is taken from the occupancy.
+
+    Attributes:
+        threshold: occupancy probability at the surface; None: the checkpoint's own.
+        resolution: cells along each side of the cube.
+        steps: of the search for each vertex's true place.
+        simplify: how far the surface may move for fewer faces, metres; None: not at all.
+        color: take the vertices' colours from the photographs.
+    """
+
+    threshold: float | None = None
+    resolution: int = 128
+    steps: int = 1
+    simplify: float | None = None
+    color: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """What was made of a pair.
+
+    Attributes:
+        mesh: closed, metres, left camera's frame (+X right, +Y down, +Z forward).
+        left_from_cube: 4x4 similarity from the working cube, whose side is ``unit`` metres.
+        threshold: occupancy probability at the surface.
+        confidence: the IoU that the model itself expects, 0 to 1.
+        seconds: of each stage.
+    """
+
+    mesh: Trimesh
+    left_from_cube: NDArray[np.float64]
+    unit: float
+    threshold: float
+    confidence: float
+    found: tuple[Found, Found] | None
+    pair: RealPair
+    images: tuple[NDArray[np.uint8], NDArray[np.uint8]]
+    framing: Framing
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def left_from_rig(self) -> NDArray[np.float64]:
+        """4x4 rigid, metres, from the rig frame: the cube's centre, +X right, +Y up, +Z towards the cameras."""
+        rigid = self.left_from_cube.copy()
+        rigid[:3, :3] /= self.unit
+        return rigid
+
+    def mesh_in_rig(self) -> Trimesh:
+        """The mesh in the rig frame, metres."""
+        mesh = self.mesh.copy()
+        mesh.apply_transform(np.linalg.inv(self.left_from_rig))
+        return mesh
+
+    def preview(self) -> NDArray[np.uint8]:
+        """RGB: both photographs with the mesh's outline, and the parts of them that the model was given."""
+        boxes = None if self.found is None else [part.box for part in self.found]
+        return preview(self.mesh, self.pair, self.images, boxes, self.framing.cameras)
+
+    def description(self) -> dict[str, Any]:
+        """Plain values for a JSON file."""
+        mesh = self.mesh
+        return {
+            "unit": "m",
+            "volume": float(mesh.volume),
+            "area": float(mesh.area),
+            "center": mesh.bounds.mean(axis=0).tolist(),
+            "extents": mesh.extents.tolist(),
+            "watertight": bool(mesh.is_watertight),
+            "vertices": len(mesh.vertices),
+            "faces": len(mesh.faces),
+            "threshold": self.threshold,
+            "confidence": self.confidence,
+            "left_from_rig": self.left_from_rig.tolist(),
+            "left_from_cube": self.left_from_cube.tolist(),
+            "cube_side": self.unit,
+            "baseline": self.pair.baseline,
+            "found": self.found
+            and {
+                side: {"how": part.how, "box": list(vars(part.box).values())}
+                for side, part in zip(SIDES, self.found, strict=True)
+            },
+            "seconds": {name: round(value, 3) for name, value in self.seconds.items()},
+        }
+
+
+class Reconstructor:
+    """Reconstructs the object in calibrated pairs with one model.
+
+    Args:
+        config: of the model's training: how it wants to see a pair.
+        predict: what the model says of a pair.
+        threshold: decision threshold on the probability.
+        name: of the checkpoint.
+    """
+
+    def __init__(self, config: TrainConfig, predict: Predictor, threshold: float, name: str) -> None:
+        self.config, self.predict, self.threshold, self.name = config, predict, threshold, name
+
+    @classmethod
+    def from_checkpoint(cls, checkpoint: str | Path, backend: str = "torch") -> Self:
+        """Of a run's ``best.ckpt``, exported ``.safetensors``, or the name of shipped weights.
+
+        Args:
+            backend: ``torch``; or ``onnx``, for what ``python -m stereo_occ.export onnx=true`` wrote.
+
+        Raises:
+            UserError: it cannot be read.
+        """
+        if backend == "onnx":
+            from stereo_occ.onnx_model import load_onnx  # needs the extra onnx
+
+            trained: Any = load_onnx(str(checkpoint))
+        else:
+            trained = load_trained(str(checkpoint))
+        return cls(trained.config, trained.predict, trained.threshold, trained.name)
+
+    @classmethod
+    def from_model(cls, trained: TrainedModel) -> Self:
+        """Of a model in memory."""
+        return cls(trained.config, trained.predict, trained.threshold, trained.name)
+
+    def __call__(
+        self,
+        left: ImageFile,
+        right: ImageFile,
+        rig: RealPair | str | Path | Sequence[str | Path],
+        *,
+        boxes: Pair = (None, None),
+        masks: Pair = (None, None),
+        center: Sequence[float] | None = None,
+        size: float | None = None,
+        unit: str | float | None = None,
+        rectified: bool = False,
+        surface: SurfaceOptions = SurfaceOptions(),
+    ) -> Reconstruction:
+        """The mesh of the object in a pair.
+
+        Args:
+            left, right: image files, or RGB ``(H, W, 3)``.
+            rig: calibration, or its files; see :func:`~stereo_occ.calibration.read_calibration`, also for ``unit``
+                and ``rectified``.
+            boxes: around the object in each image: left, top, right, bottom, pixels.
+            masks: image files or boolean ``(H, W)``, where the object is. Without boxes and masks: the images'
+                transparency, else ``center`` and ``size``, else what stands out from a plain background.
+            center: of the object, left camera's frame, metres; triangulated if None.
+            size: diagonal of the object's bounding box, metres; from the boxes if None.
+
+        Raises:
+            UserError: for anything in this that the user can put right, or if nothing is found to be occupied.
+        """
+        seconds: dict[str, float] = {}
+        with _timed(seconds, "read"):
+            pair = rig if isinstance(rig, RealPair) else read_calibration(rig, unit, rectified)
+            photos = _photo(left, "left"), _photo(right, "right")
+            pair = pair.fitted((photos[0].size, photos[1].size))
+        on_object = isinstance(self.config.rig, RectifiedRigConfig)
+        given = center is not None and size is not None
+        with _timed(seconds, "locate"):
+            found = _locate(photos, boxes, masks, required=on_object and not given)
+        with _timed(seconds, "frame"):
+            framing = self._frame(pair, found, center, size)
+            views = self._views(pair, photos, found, framing)
+        with _timed(seconds, "encode"):
+            occupancy = self.predict(views)
+        threshold = self.threshold if surface.threshold is None else surface.threshold
+        with _timed(seconds, "extract"):
+            field = sample_cube(occupancy, threshold, surface.resolution)
+            mesh = field.surface(surface.steps)
+        if not len(mesh.faces):
+            raise UserError(
+                f"nothing is occupied at a probability of {threshold:.3g}; check the boxes and the calibration with "
+                f"the images, or lower threshold="
+            )
+        left_from_cube = np.asarray(np.linalg.inv(framing.cube_from_left), dtype=np.float64)
+        mesh = Trimesh(transform_points(np.asarray(mesh.vertices), left_from_cube), mesh.faces, process=False)
+        images = photos[0].rgb_HW3, photos[1].rgb_HW3
+        with _timed(seconds, "finish"):
+            if surface.simplify:
+                mesh = simplified(mesh, surface.simplify)
+            if surface.color:
+                clearance = framing.unit / surface.resolution
+                mesh.visual = ColorVisuals(mesh, vertex_colors=vertex_colors(mesh, pair, images, clearance))
+        return Reconstruction(
+            mesh,
+            left_from_cube,
+            framing.unit,
+            threshold,
+            expected_iou(field),
+            found,
+            pair,
+            images,
+            framing,
+            seconds,
+        )
+
+    def _frame(
+        self,
+        pair: RealPair,
+        found: tuple[Found, Found] | None,
+        center: Sequence[float] | None,
+        size: float | None,
+    ) -> Framing:
+        config, side = self.config.rig, self.config.data.image_side
+        if isinstance(config, RectifiedRigConfig):
+            center_3 = None if center is None else np.asarray(center, dtype=np.float64)
+            if center_3 is not None and (center_3.shape != (3,) or not np.isfinite(center_3).all()):
+                raise UserError(f"center={list(center or [])}: must be [x,y,z] in metres")
+            return frame_on_object(pair, config, self.config.placement.kind, side, found, center_3, size)
+        if center is not None or size is not None:
+            raise UserError(
+                f"center, size: the checkpoint {self.name} looks at the whole view about the point where the cameras' "
+                f"axes meet, so these have no effect; leave them out"
+            )
+        return frame_on_fixation(pair, config, side)
+
+    def _views(
+        self, pair: RealPair, photos: tuple[Photo, Photo], found: tuple[Found, Found] | None, framing: Framing
+    ) -> StereoViews:
+        """What the model is given: cut, straightened, and behind the object what it was trained with."""
+        background = self.config.background
+        masks = None if found is None or found[0].mask_HW is None or found[1].mask_HW is None else found
+        if background.masked and masks is None:
+            raise UserError(
+                f"the checkpoint {self.name} was trained on pictures without a background: give left_mask= and "
+                f"right_mask=, or images that are transparent around the object"
+            )
+        images = []
+        for index, (photo, camera, view) in enumerate(
+            zip(photos, pair.cameras, framing.cameras, strict=True)
+        ):
+            rgb_HW3 = seen_by(photo.rgb_HW3, camera, view) / 255
+            if masks is not None and (background.masked or background.clutter is None):
+                mask_HW = masks[index].mask_HW
+                assert mask_HW is not None
+                share_HW1 = seen_by(mask_HW[..., None].astype(np.uint8) * 255, camera, view, outside=0) / 255
+                color_3 = (np.array(background.low) + background.high) / 2
+                rgb_HW3 = rgb_HW3 * share_HW1 + color_3 * (1 - share_HW1)
+            images.append(torch.as_tensor(np.asarray(rgb_HW3, dtype=np.float32)).permute(2, 0, 1)[None])
+        cameras = framing.rig.cameras
+        return StereoViews(
+            images[0],
+            images[1],
+            torch.as_tensor(np.stack([camera.K for camera in cameras]), dtype=torch.float32)[None],
+            torch.as_tensor(np.stack([c.camera_from_rig for c in cameras]), dtype=torch.float32)[None],
+        )
+
+
+def _photo(image: ImageFile, name: str) -> Photo:
+    if not isinstance(image, np.ndarray):
+        return read_photo(Path(image), name)
+    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
+        raise UserError(f"{name}: an array must be (H, W, 3) of uint8, got {image.shape} of {image.dtype}")
+    return Photo(image)
+
+
+def _locate(
+    photos: tuple[Photo, Photo], boxes: Pair, masks: Pair, required: bool
+) -> tuple[Found, Found] | None:
+    """Both, or neither where that is not required."""
+    found = [_given(*part) for part in zip(photos, boxes, masks, SIDES, strict=True)]
+    if found[0] is not None and found[1] is not None:
+        return found[0], found[1]
+    if found[0] is not None or found[1] is not None:
+        have, lack = SIDES if found[0] is not None else SIDES[::-1]
+        raise UserError(
+            f"{lack}: where the object is was given for the {have} image alone; give {lack}_box= too"
+        )
+    if not required:
+        return None
+    left, right = (
+        on_plain_background(photo.rgb_HW3, side) for photo, side in zip(photos, SIDES, strict=True)
+    )
+    return left, right
+
+
+def _given(photo: Photo, box: Any, mask: Any, name: str) -> Found | None:
+    mask_HW = photo.mask_HW
+    if mask is not None:
+        if isinstance(mask, np.ndarray):
+            if mask.shape != photo.rgb_HW3.shape[:2] or not mask.any():
+                raise UserError(f"{name}_mask: must have the image's size and true pixels, got {mask.shape}")
+            mask_HW = mask.astype(bool)
+        else:
+            mask_HW = read_mask(Path(mask), f"{name}_mask", photo.size)
+    if mask_HW is not None and not mask_HW.any():
+        raise UserError(f"{name}: the image is transparent everywhere, so no object is seen")
+    if box is not None:
+        found = in_box(box, photo.size, f"{name}_box")
+        return found if mask_HW is None else Found(found.outline_N2, mask_HW, "box and mask")
+    return None if mask_HW is None else in_mask(mask_HW)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[name] = time.perf_counter() - start

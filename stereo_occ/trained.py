@@ -1,0 +1,68 @@
+"""A trained model with what it needs to know of its training, ready to answer."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from omegaconf import OmegaConf
+
+from stereo_occ.checkpoint import KEY, plain, read_checkpoint
+from stereo_occ.config import TrainConfig, training_config
+from stereo_occ.data.rigs import build_rig
+from stereo_occ.errors import UserError
+from stereo_occ.models.base import OccupancyModel, StereoViews
+from stereo_occ.models.build import build_model
+from stereo_occ.packaged import shipped
+from stereo_occ.reconstruction import Occupancy, occupancy_of
+
+#: What a stereo pair (``B = 1``) makes of a model.
+Predictor = Callable[[StereoViews], Occupancy]
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedModel:
+    """A model in eval mode.
+
+    Attributes:
+        config: of the training.
+        threshold: decision threshold on the probability.
+        step: of the training.
+        name: as it was asked for.
+    """
+
+    model: OccupancyModel
+    config: TrainConfig
+    threshold: float
+    step: int
+    name: str
+
+    def predict(self, views: StereoViews) -> Occupancy:
+        """See :data:`Predictor`."""
+        return occupancy_of(self.model, views)
+
+
+def load_trained(name: str) -> TrainedModel:
+    """The model of a checkpoint of a run, of exported weights, or of shipped ones by their name.
+
+    Raises:
+        UserError: there is no such file, or it is none of these.
+    """
+    if not Path(name).suffix and not Path(name).exists() and name not in shipped():
+        raise UserError(
+            f"checkpoint={name}: no such file, and of that name no weights are shipped "
+            f"({', '.join(shipped()) or 'there are none'}); give the best.ckpt of a training run"
+        )
+    checkpoint = read_checkpoint(Path(name))
+    cfg = training_config(checkpoint[KEY]["config"])
+    typed = OmegaConf.to_object(cfg)
+    assert isinstance(typed, TrainConfig)
+    model = build_model(plain(cfg.model), build_rig(typed.rig, typed.data.image_side), load_weights=False)
+    state = checkpoint["state_dict"]
+    try:
+        model.load_state_dict({key[6:]: value for key, value in state.items() if key.startswith("model.")})
+        threshold = float(state["threshold"])
+    except (RuntimeError, KeyError) as error:
+        raise UserError(
+            f"checkpoint={name}: its weights do not fit its configuration; it was written by another version"
+        ) from error
+    return TrainedModel(model.eval(), typed, threshold, int(checkpoint["global_step"] or 0), name)
