@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from omegaconf import DictConfig, OmegaConf
 
+from stereo_occ.controls import CONTROLS
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.look import check_look
 from stereo_occ.data.rigs import RigConfig, ToedInRigConfig, build_rig
@@ -43,6 +44,7 @@ def check_training(cfg: DictConfig) -> list[str]:
         *pairs,
         *([] if pairs else [*_split(cfg), *_model(cfg)]),
         *_schedule(cfg),
+        *_control(cfg),
         *_settings(cfg),
         *_hardware(cfg),
     ]
@@ -51,6 +53,7 @@ def check_training(cfg: DictConfig) -> list[str]:
 def check_evaluation(cfg: DictConfig) -> list[str]:
     """Problems of an evaluation configuration, its checkpoint unread."""
     problems = [
+        *(_control(cfg) if cfg.control is not None else []),
         *_at_least(1, cfg, "views", "points", "batch_size", "mesh_resolution"),
         *_at_least(0, cfg, "examples", "workers"),
         *_known("subset", cfg.subset, (*SUBSETS, "all", "auto")),
@@ -175,6 +178,15 @@ def _schedule(cfg: DictConfig) -> Iterator[str]:
         )
     if cfg.validation.views > cfg.data.views:
         yield f"validation.views={cfg.validation.views}: there are only data.views={cfg.data.views} per object"
+
+
+def _control(cfg: DictConfig) -> Iterator[str]:
+    name, degrees = cfg.control.name, cfg.control.degrees
+    yield from _known("control.name", name, CONTROLS)
+    if name == "calibration_off" and not 0 < degrees <= 180:
+        yield f"control.degrees={degrees}: must be above 0 and at most 180"
+    elif name != "calibration_off" and degrees:
+        yield f"control.degrees={degrees}: control={name} turns no camera; leave it at 0"
 
 
 def _settings(cfg: DictConfig) -> Iterator[str]:

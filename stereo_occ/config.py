@@ -12,6 +12,7 @@ from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from stereo_occ.baselines.config import BASELINE_SCHEMAS
+from stereo_occ.controls import ControlConfig
 from stereo_occ.data.config import DATA_SCHEMAS, DataConfig, SliceConfig
 from stereo_occ.data.placement import PlacementConfig
 from stereo_occ.data.rigs import RIG_SCHEMAS, RigConfig, ToedInRigConfig
@@ -151,6 +152,7 @@ class TrainConfig(PairsConfig):
     """``python -m stereo_occ.train``"""
 
     model: Any = MISSING
+    control: ControlConfig = field(default_factory=ControlConfig)
     queries: QueriesConfig = MISSING
     optimizer: OptimizerConfig = MISSING
     scheduler: SchedulerConfig = MISSING
@@ -189,6 +191,7 @@ class EvaluateConfig:
     background: Any = None
     sensor: Any = None
     categories: Any = None
+    control: ControlConfig | None = None
     paths: PathsConfig = MISSING
     trainer: TrainerConfig = MISSING
     workers: int = MISSING
@@ -256,6 +259,7 @@ def register_schemas() -> None:
         ("categories", CategoriesConfig),
         ("scale", ScaleConfig),
         ("paths", PathsConfig),
+        ("control", ControlConfig),
         ("queries", QueriesConfig),
         ("optimizer", OptimizerConfig),
         ("scheduler", SchedulerConfig),

@@ -43,6 +43,8 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
         torch.set_num_threads(settings.trainer.threads)
     checkpoint = read_checkpoint(Path(settings.checkpoint))
     trained = training_config(checkpoint[KEY]["config"])
+    if settings.control is not None:
+        trained.control = settings.control
     task = build_task(trained, load_weights=False)
     load_weights(task, checkpoint["state_dict"], settings.checkpoint)
     if settings.subset == "auto":
@@ -151,6 +153,7 @@ def write_results(
             "views": settings.views,
             "points": settings.points,
             "threshold": threshold,
+            "control": vars(task.config.control),
             "skipped": len(skipped),
             "metrics": metrics,
         },
@@ -174,7 +177,7 @@ def write_examples(
     """Example meshes as GLB and pictures as PNG, left | right | predicted | true."""
     rig = build_rig(data.pairs.rig, data.pairs.data.image_side)
     for example in examples(data.evaluation_dataset(settings.subset), settings.examples):
-        views = example.batch.views
+        views = task.seen(example.batch).views
         predicted = reconstruct(task.model, views, float(task.threshold), settings.mesh_resolution)
         name = f"{example.id.category}/{example.id.object_id}_view{example.id.view}"
         for kind, mesh in (("predicted", predicted), ("true", example.true)):

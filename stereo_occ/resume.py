@@ -16,7 +16,7 @@ from stereo_occ.errors import UserError
 #: What must not change between the parts of a run. Hardware, logging and the length of the run may.
 FIXED = (
     "data", "rig", "placement", "lights", "material", "texture", "background", "sensor", "categories",
-    "model", "queries", "optimizer", "seed", "points", "batch_size",
+    "model", "control", "queries", "optimizer", "seed", "points", "batch_size",
 )  # fmt: skip
 
 

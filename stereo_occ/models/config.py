@@ -148,7 +148,7 @@ class PixelStereoConfig:
 
     name: str = "pixel_stereo"
     feature_stride: int = MISSING  # of the sampled features, in image pixels
-    views: str = MISSING  # both; left or left_twice: a single view with the same parameters, for comparison
+    views: str = MISSING  # both; left: that view alone with the same parameters, for comparison
     groups: int = MISSING  # of channels, for the correlation
     frequencies: int = MISSING  # of the positional encoding
     code_size: int = MISSING  # of the code for the whole pair

@@ -12,7 +12,7 @@ from stereo_occ.models.evidence import GlobalCode, PairEvidence, positional_enco
 from stereo_occ.models.point_decoder import PointDecoder
 from stereo_occ.models.sampling import Projections, project_points, ray_maps
 
-VIEWS = {"both": (0, 1), "left": (0,), "left_twice": (0, 0)}
+VIEWS = {"both": 2, "left": 1}  # how many are encoded
 PIXEL_CHANNELS = 8  # of the evidence read from the images themselves
 SAMPLES = 65536  # points times batch that are answered at once, which bounds the memory
 
@@ -60,8 +60,7 @@ class PixelStereoModel(OccupancyModel):
 
     Args:
         extra: channels that a subclass adds to the token.
-        views: ``both``; or for comparison, with the same parameters, ``left`` (nothing is seen by the right view) or
-            ``left_twice`` (the right view is the left one again, image and camera).
+        views: ``both``; or for comparison, with the same parameters, ``left`` (nothing is seen by the right view).
         groups: of channels, for the correlation.
         frequencies: of the positional encoding.
         code_size: channels of the code for the whole pair.
@@ -102,14 +101,12 @@ class PixelStereoModel(OccupancyModel):
 
     def calibrated_maps(self, views: StereoViews) -> CalibratedMaps:
         """Features of the chosen views with their cameras."""
-        index = list(self.views)
-        images_VB3HW = torch.stack((views.left_BCHW, views.right_BCHW)[: max(index) + 1])
-        features_VBCHW = self.encoder(images_VB3HW.flatten(0, 1)).unflatten(0, images_VB3HW.shape[:2])
+        images_VB3HW = torch.stack((views.left_BCHW, views.right_BCHW)[: self.views])
         return CalibratedMaps(
-            features_VBCHW[index],
-            images_VB3HW[index],
-            views.K_B233[:, index].transpose(0, 1),
-            views.camera_from_rig_B244[:, index].transpose(0, 1),
+            self.encoder(images_VB3HW.flatten(0, 1)).unflatten(0, images_VB3HW.shape[:2]),
+            images_VB3HW,
+            views.K_B233[:, : self.views].transpose(0, 1),
+            views.camera_from_rig_B244[:, : self.views].transpose(0, 1),
         )
 
     def decode(self, code: PixelStereoCode, points_BN3: Tensor) -> Tensor:

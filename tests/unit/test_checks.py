@@ -70,6 +70,9 @@ def valid():
         ("logger.mesh_resolution=0", "logger.mesh_resolution=0: must be at least 1"),
         ("model.encoder.name=foo", "model.encoder: unknown 'foo'"),
         ("model.decoder.hidden=0", "model.decoder.hidden: must be at least 1, got 0"),
+        ("control.name=left_twic", "control.name=left_twic: unknown; did you mean left_twice"),
+        ("control.name=calibration_off", "control.degrees=0.0: must be above 0 and at most 180"),
+        ("control.degrees=2", "control.degrees=2.0: control=none turns no camera; leave it at 0"),
     ],
 )
 def test_a_problem_of_a_training(valid, overrides, expected):
@@ -138,12 +141,13 @@ def test_rendering_needs_no_division_into_subsets():
         ("points=0", "points=0: must be at least 1"),
         ("mesh_resolution=0", "mesh_resolution=0: must be at least 1"),
         ("examples=-1", "examples=-1: must be at least 0"),
+        ("control=calibration_off_1 control.degrees=-1", "control.degrees=-1.0: must be above 0"),
         ("checkpoint=nowhere.ckpt", "checkpoint=nowhere.ckpt: no such file; give the path of a .ckpt"),
     ],
 )
 def test_a_problem_of_an_evaluation(tmp_path, override, expected):
     (tmp_path / "best.ckpt").touch()
-    overrides = [f"checkpoint={tmp_path / 'best.ckpt'}", override]
+    overrides = [f"checkpoint={tmp_path / 'best.ckpt'}", *override.split()]
     (problem,) = find_problems("evaluate", overrides, check_evaluation)
     assert problem.startswith(expected)
     assert single_line(problem)

@@ -180,6 +180,41 @@ def test_experiments_change_no_more_than_they_say():
     assert changed == {"scale", "data", "validation"}
 
 
+def changed_by(experiment, base=()):
+    before, after = (
+        plain(compose_config("train", more)) for more in (base, [*base, f"experiment={experiment}"])
+    )
+    return {key for key in before if before[key] != after[key]}
+
+
+def test_the_recipe_of_comparisons():
+    assert changed_by("recipe") == {"queries", "optimizer", "scheduler", "trainer"}
+    cfg = compose_config("train", ["experiment=recipe", "optimizer=adam", "trainer.precision=32-true"])
+    assert (cfg.optimizer.name, cfg.trainer.precision) == ("adam", "32-true")
+
+
+@pytest.mark.parametrize(
+    ("experiment", "control"),
+    [
+        ("right_zeroed", ("right_zeroed", 0)),
+        ("left_twice", ("left_twice", 0)),
+        ("right_shuffled", ("right_shuffled", 0)),
+        ("calibration_off_0.5", ("calibration_off", 0.5)),
+        ("calibration_off_1", ("calibration_off", 1)),
+        ("calibration_off_2", ("calibration_off", 2)),
+    ],
+)
+def test_twins_are_the_recipe_under_a_control(experiment, control):
+    recipe, twin = (compose_config("train", [f"experiment={name}"]) for name in ("recipe", experiment))
+    assert (twin.control.name, twin.control.degrees) == control
+    assert plain(twin) == plain(recipe) | {"control": plain(twin)["control"]}
+
+
+def test_a_checkpoint_from_before_the_training_aids_is_one_without():
+    values = plain(compose_config("train"))
+    assert plain(training_config({key: value for key, value in values.items() if key != "control"})) == values
+
+
 def test_inspecting_needs_only_the_folder(tmp_path):
     root = f"data.root={tmp_path}"
     assert find_problems("inspect", [root], check_pairs) == []

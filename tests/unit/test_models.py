@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import torch
+import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.config_store import ConfigStore
 from hydra.errors import ConfigCompositionException
@@ -73,6 +74,7 @@ def leave_zero(model):
         (["model=stereo"], "laptop", 64, 4_969_609),
         (["model=stereo"], "paper", 224, 7_353_993),
         (MONO, "laptop", 64, 13_048_129),
+        (["model=mono_scratch"], "laptop", 64, 13_048_129),
         (MONO, "paper", 224, 14_984_769),
         (["model/cost_volume=correlation_signed"], "laptop", 64, 4_971_921),
         (["model/cost_volume=groupwise"], "laptop", 64, 4_967_881),
@@ -95,7 +97,8 @@ def test_parameter_counts(overrides, scale, side, count):
 @pytest.mark.parametrize("kind", ["encoder", "cost_volume", "decoder", "."])
 def test_every_shipped_file_is_tested_and_every_name_is_shipped(kind):
     known = {"encoder": ENCODERS, "cost_volume": COST_VOLUMES, "decoder": DECODERS, ".": MODELS}[kind]
-    assert {path.stem for path in (CONF / "model" / kind).glob("*.yaml")} == set(known)
+    files = [yaml.safe_load(path.read_text()) for path in (CONF / "model" / kind).glob("*.yaml")]
+    assert {file["defaults"][0].removeprefix("base_") for file in files} == set(known)
 
 
 @pytest.mark.parametrize("encoder", ENCODERS)

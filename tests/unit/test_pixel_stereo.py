@@ -112,9 +112,8 @@ def test_moving_the_rig_frame_does_not_move_what_is_seen(model):
     torch.testing.assert_close(moved_seen.depths_VBN, seen.depths_VBN)
 
 
-@pytest.mark.parametrize("choice", ["left", "left_twice"])
-def test_twins_have_the_same_parameters_and_ignore_the_right_view(config, choice):
-    twin, pair = build(config, views=choice), build(config)
+def test_the_twin_of_one_view_has_the_same_parameters_and_ignores_the_right_view(config):
+    twin, pair = build(config, views="left"), build(config)
     assert {n: p.shape for n, p in twin.named_parameters()} == {
         n: p.shape for n, p in pair.named_parameters()
     }
@@ -129,19 +128,6 @@ def test_twins_have_the_same_parameters_and_ignore_the_right_view(config, choice
     )
     assert torch.equal(twin(views, points), twin(unlike, points))
     assert (pair(views, points) - pair(unlike, points)).abs().max() > 1e-3
-
-
-def test_the_left_view_twice_is_the_pair_of_two_equal_views(config):
-    twin, pair = build(config, views="left_twice"), build(config)
-    twin.load_state_dict(pair.state_dict())
-    views, points = random_pairs(3), some_points(3)
-    equal = replace(
-        views,
-        right_BCHW=views.left_BCHW,
-        K_B233=views.K_B233[:, [0, 0]],
-        camera_from_rig_B244=views.camera_from_rig_B244[:, [0, 0]],
-    )
-    torch.testing.assert_close(twin(views, points), pair(equal, points))
 
 
 def test_the_left_view_alone_is_the_pair_whose_right_camera_looks_away(config):
@@ -168,7 +154,7 @@ def test_answers_under_autocast_are_float32_and_close(model):
     assert (logits - expected).abs().max() < 0.1 * expected.abs().max()
 
 
-@pytest.mark.parametrize("views", ["both", "left", "left_twice"])
+@pytest.mark.parametrize("views", ["both", "left"])
 @pytest.mark.parametrize("stride", [2, 4])
 def test_training_reaches_every_parameter(config, views, stride):
     model = build(config, views=views, feature_stride=stride).train()
@@ -219,5 +205,5 @@ def test_codes_are_gains_and_biases_of_each_block():
 def test_other_views_are_refused():
     encoder = LightEncoder(**{key: ENCODER[key] for key in ("channels", "widths", "blocks")}, stride=4)
     settings = {"groups": 2, "frequencies": 2, "code_size": 8, "hidden": 8, "blocks": 1}
-    with pytest.raises(UserError, match=r"model\.views: must be one of both, left, left_twice, got right"):
+    with pytest.raises(UserError, match=r"model\.views: must be one of both, left, got right"):
         PixelStereoModel(encoder, views="right", **settings)

@@ -1,0 +1,87 @@
+"""Controls: the same network, data and schedule, with something taken from the second view.
+
+What a network gains from a pair shows only beside a twin that has the same parameters and lacks the pair. A control
+changes every batch alike, of training and of evaluation, whatever the model.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from zlib import crc32
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from torch import Tensor
+
+from stereo_occ.data.batch import Batch, ViewId
+
+
+@dataclass
+class ControlConfig:
+    """What is taken from the pair, in training and evaluation alike."""
+
+    name: str = "none"
+    degrees: float = 0.0  # of calibration_off: angle between the right camera and what is said of it
+
+
+def controlled(config: ControlConfig, batch: Batch) -> Batch:
+    """What a network under the control sees of ``batch``; the same whenever it is asked."""
+    return CONTROLS[config.name](batch, config.degrees)
+
+
+def _none(batch: Batch, _degrees: float) -> Batch:
+    return batch
+
+
+def _right_zeroed(batch: Batch, _degrees: float) -> Batch:
+    """A black right image; both cameras are known."""
+    return _with_right_image(batch, lambda _left, right: torch.zeros_like(right))
+
+
+def _left_twice(batch: Batch, _degrees: float) -> Batch:
+    """The left image and the left camera in the place of the right ones."""
+    twice = _with_right_image(batch, lambda left, _right: left)
+    views = twice.views
+    cameras = {
+        "K_B233": views.K_B233[:, [0, 0]],
+        "camera_from_rig_B244": views.camera_from_rig_B244[:, [0, 0]],
+    }
+    return replace(twice, views=replace(views, **cameras))
+
+
+def _right_shuffled(batch: Batch, degrees: float) -> Batch:
+    """The right image of another pair of the batch, a black one if there is no other; the cameras stay."""
+    if len(batch) == 1:
+        return _right_zeroed(batch, degrees)
+    return _with_right_image(batch, lambda _left, right: right.roll(1, dims=0))
+
+
+def _calibration_off(batch: Batch, degrees: float) -> Batch:
+    """The right camera said to be turned about its centre, around another axis in each view."""
+    extrinsics_B244 = batch.views.camera_from_rig_B244.clone()
+    turns_B33 = Rotation.from_rotvec(degrees * axes_of(batch.ids), degrees=True).as_matrix()
+    extrinsics_B244[:, 1, :3] = torch.as_tensor(turns_B33).to(extrinsics_B244) @ extrinsics_B244[:, 1, :3]
+    return replace(batch, views=replace(batch.views, camera_from_rig_B244=extrinsics_B244))
+
+
+CONTROLS: dict[str, Callable[[Batch, float], Batch]] = {
+    "none": _none,
+    "right_zeroed": _right_zeroed,
+    "left_twice": _left_twice,
+    "right_shuffled": _right_shuffled,
+    "calibration_off": _calibration_off,
+}
+
+
+def axes_of(ids: Sequence[ViewId]) -> NDArray[np.float64]:
+    """Unit vectors ``(B, 3)``, uniform on the sphere; each view has its own for ever."""
+    names = [f"{view.category}/{view.object_id}/{view.view}".encode() for view in ids]
+    axes_B3 = np.stack([np.random.default_rng(crc32(name)).standard_normal(3) for name in names])
+    return np.asarray(axes_B3 / np.linalg.norm(axes_B3, axis=1, keepdims=True))
+
+
+def _with_right_image(batch: Batch, right_of: Callable[[Tensor, Tensor], Tensor]) -> Batch:
+    """The batch with a right image made of the left and the right one."""
+    views = batch.views
+    return replace(batch, views=replace(views, right_BCHW=right_of(views.left_BCHW, views.right_BCHW)))
