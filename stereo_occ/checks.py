@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from omegaconf import DictConfig, OmegaConf
 
+from stereo_occ.baselines.config import baseline_problems
 from stereo_occ.controls import CONTROLS
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.look import check_look
@@ -54,15 +55,22 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
     """Problems of an evaluation configuration, its checkpoint unread."""
     problems = [
         *(_control(cfg) if cfg.control is not None else []),
-        *_at_least(1, cfg, "views", "points", "batch_size", "mesh_resolution"),
-        *_at_least(0, cfg, "examples", "workers"),
+        *_at_least(1, cfg, "views", "points", "batch_size", "mesh_resolution", "surface_points"),
+        *_at_least(0, cfg, "meshes", "examples", "workers"),
         *_known("subset", cfg.subset, (*SUBSETS, "all", "auto")),
         *_hardware(cfg),
     ]
-    if not Path(cfg.checkpoint).is_file():
+    if cfg.checkpoint is None and cfg.baseline is None:
+        problems.append("checkpoint: no value given; add checkpoint=... or baseline=...")
+    elif cfg.checkpoint is not None and not Path(cfg.checkpoint).is_file():
         problems.append(
             f"checkpoint={cfg.checkpoint}: no such file; give the path of a .ckpt file of a training run"
         )
+    if cfg.checkpoint is not None and cfg.training:
+        problems.append(f"training={cfg.training}: the checkpoint says what it was trained on; leave one out")
+    if cfg.baseline is not None:
+        baseline: Any = OmegaConf.to_object(cfg.baseline)
+        problems += baseline_problems(baseline)
     if cfg.data is not None and "root" in cfg.data:
         problems += _folder(cfg)
     return problems

@@ -1,88 +1,128 @@
-"""``python -m stereo_occ.evaluate``: test metrics, one row per object, example meshes and pictures."""
+"""``python -m stereo_occ.evaluate``: every metric of a network or a baseline, one row per object-view, examples.
 
-import csv
+``metrics.json`` has the keys of :mod:`stereo_occ.metrics_file` and:
+    predictor: ``checkpoint`` or ``baseline`` with its settings.
+    step, parameters: of the network; null for a baseline.
+    config: the settings of the evaluation.
+    subset, data, objects, views, points: what was measured, and the folder of its shards.
+    split: ``hash`` of the names of training and evaluated objects, see :func:`~stereo_occ.provenance.split_hash`.
+    threshold: decision threshold, chosen on validation objects.
+    skipped: mesh files that gave no object.
+    failures: number of object-views by failure; they are counted in every mean.
+    meshes: how many views per object had their mesh measured, at which resolution, from how many points.
+    reliability: per category, for each bin of probability: points, mean probability, share occupied (of the cube).
+    metrics: ``test/<metric>`` (mean of category means), ``test/<metric>/<category>``, ``test/<metric>/all``.
+"""
+
 import logging
+import time
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import lightning
 import torch
 from hydra.core.hydra_config import HydraConfig
-from lightning.pytorch.callbacks import TQDMProgressBar
 from omegaconf import DictConfig, OmegaConf
-from PIL import Image
 
-from stereo_occ.checkpoint import KEY, build_task, read_checkpoint
-from stereo_occ.checks import check_evaluation, check_pairs
-from stereo_occ.cli import entry_point
-from stereo_occ.config import EvaluateConfig, TrainConfig, training_config
-from stereo_occ.data.datamodule import PairsDataModule
-from stereo_occ.data.examples import examples
-from stereo_occ.data.rigs import build_rig
+from stereo_occ.baselines.build import build_baseline
+from stereo_occ.checkpoint import KEY, build_task, plain, read_checkpoint
+from stereo_occ.checks import check_evaluation
+from stereo_occ.cli import compose_config, entry_point
+from stereo_occ.config import EvaluateConfig, training_config
 from stereo_occ.errors import UserError
-from stereo_occ.metrics_file import environment, write_json
-from stereo_occ.pictures import comparison
+from stereo_occ.evaluation_data import (
+    GROUPS,
+    evaluated_pairs,
+    has_other_meshes,
+    own_settings,
+    split_facts,
+    training_pairs,
+)
+from stereo_occ.evaluation_files import write_csv, write_examples
+from stereo_occ.measurement import Measurement, MeshSettings, measure
+from stereo_occ.metrics.calibration import expected_calibration_error
+from stereo_occ.metrics.summary import summarise
+from stereo_occ.metrics_file import write_json
+from stereo_occ.predictors import LearnedPredictor, Predictor
+from stereo_occ.provenance import environment
 from stereo_occ.quiet import quiet_libraries
-from stereo_occ.reconstruction import reconstruct
 from stereo_occ.task import OccupancyTask
 
 logger = logging.getLogger(__name__)
 
-GROUPS = ("data", "rig", "placement", "lights", "material", "texture", "background", "sensor", "categories")
-
 
 def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
-    """Evaluate ``cfg.checkpoint`` and write ``metrics.json``, ``per_object.csv``, ``meshes/`` and ``pictures/``.
+    """Measure ``cfg.checkpoint`` or ``cfg.baseline`` and write results into ``folder``.
 
     Returns:
         The metrics, with the keys of ``metrics.json``'s ``metrics``.
     """
+    start = time.monotonic()
     quiet_libraries()
     settings = own_settings(cfg)
     if settings.trainer.threads:
         torch.set_num_threads(settings.trainer.threads)
-    checkpoint = read_checkpoint(Path(settings.checkpoint))
-    trained = training_config(checkpoint[KEY]["config"])
+    checkpoint = read_checkpoint(Path(settings.checkpoint)) if settings.checkpoint else None
+    trained = (
+        training_config(checkpoint[KEY]["config"])
+        if checkpoint
+        else compose_config("train", settings.training)
+    )
     if settings.control is not None:
         trained.control = settings.control
-    task = build_task(trained, load_weights=False)
-    load_weights(task, checkpoint["state_dict"], settings.checkpoint)
     if settings.subset == "auto":
-        settings.subset = "all" if _other_meshes(cfg, trained) else "test"
-    data = build_data(cfg, settings, trained)
+        settings.subset = "all" if has_other_meshes(cfg, trained) else "test"
+    data = evaluated_pairs(cfg, settings, trained)
+    dataset = data.evaluation_dataset(settings.subset)
+    facts: dict[str, Any] = {"step": None, "parameters": None}
+    predictor: Predictor
+    if settings.baseline is not None:
+        training = training_pairs(cfg, settings, trained)
+        predictor = build_baseline(settings.baseline, training, settings.progress)
+    else:
+        assert checkpoint is not None
+        task = build_task(trained, load_weights=False)
+        load_weights(task, checkpoint["state_dict"], str(settings.checkpoint))
+        facts = {
+            "step": checkpoint["global_step"],
+            "parameters": sum(p.numel() for p in task.model.parameters()),
+        }
+        hardware = settings.trainer
+        predictor = LearnedPredictor(
+            task.model, float(task.threshold), hardware.accelerator, hardware.precision
+        )
     folder.mkdir(parents=True, exist_ok=True)
-    trainer = lightning.Trainer(
-        accelerator=settings.trainer.accelerator,
-        devices=settings.trainer.devices,
-        precision=settings.trainer.precision,  # type: ignore[arg-type]
-        logger=False,
-        enable_checkpointing=False,
-        callbacks=[TQDMProgressBar()] if settings.progress else [],
-        enable_progress_bar=settings.progress,
-        enable_model_summary=False,
-        default_root_dir=folder,
+    meshes = MeshSettings(settings.meshes, settings.mesh_resolution, settings.surface_points)
+    result = measure(predictor, dataset, data.evaluation_loader(settings.subset), meshes, settings.progress)
+    metrics = _metrics(result, predictor.threshold)
+    assert data.prepared is not None
+    skipped = [vars(file) for file in data.prepared.skipped]
+    write_csv(folder / "per_object.csv", result.rows)
+    if skipped:
+        write_csv(folder / "skipped.csv", skipped)
+    write_json(
+        folder / "metrics.json",
+        environment()
+        | {"predictor": _name(cfg), **facts, "config": _config(cfg, settings)}
+        | {
+            "subset": settings.subset,
+            "data": str(data.prepared.folder),
+            "objects": len({(row["category"], row["object_id"]) for row in result.rows}),
+            "views": settings.views,
+            "points": settings.points,
+            "split": split_facts(cfg, settings, trained, data),
+            "threshold": predictor.threshold,
+            "control": plain(trained.control),
+            "skipped": len(skipped),
+            "failures": dict(Counter(row["failure"] for row in result.rows if row["failure"])),
+            "meshes": vars(meshes),
+            "reliability": {name: _reliability(sums_3K) for name, sums_3K in result.reliability.items()},
+            "seconds": round(time.monotonic() - start, 1),
+            "metrics": metrics,
+        },
     )
-    trainer.test(task, data.evaluation_loader(settings.subset), verbose=False)
-    metrics = {name: float(value) for name, value in trainer.callback_metrics.items()}
-    write_results(folder, settings, checkpoint["global_step"], task, data, metrics)
-    write_examples(folder, settings, task, data)
+    write_examples(folder, predictor, dataset, settings.examples, settings.mesh_resolution)
     return metrics
-
-
-def own_settings(cfg: DictConfig) -> EvaluateConfig:
-    """The settings without the groups that complete the checkpoint's: these may refer to its values."""
-    own = cfg.copy()
-    for group in GROUPS:
-        own[group] = None
-    settings = OmegaConf.to_object(own)
-    assert isinstance(settings, EvaluateConfig)
-    return settings
-
-
-def _other_meshes(cfg: DictConfig, trained: DictConfig) -> bool:
-    """Whether the objects asked for are meshes that the checkpoint cannot have been trained on."""
-    asked, own = (OmegaConf.select(config, "data.root") for config in (cfg, trained))
-    return asked is not None and (own is None or Path(asked).resolve() != Path(own).resolve())
 
 
 def load_weights(task: OccupancyTask, state_dict: dict[str, Any], path: str) -> None:
@@ -95,102 +135,30 @@ def load_weights(task: OccupancyTask, state_dict: dict[str, Any], path: str) -> 
         ) from error
 
 
-def build_data(cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig) -> PairsDataModule:
-    """The checkpoint's own data, with the groups replaced that the command line gives.
-
-    Raises:
-        UserError: with all problems of the combination.
-    """
-    pairs = trained.copy()
-    for group in GROUPS:
-        if cfg[group] is not None:
-            pairs[group] = cfg[group]
-    if cfg.data is not None:
-        if OmegaConf.is_interpolation(cfg.data, "views"):
-            pairs.data.views = settings.views  # no more than are looked at
-        if OmegaConf.is_interpolation(cfg.data, "image_side"):
-            pairs.data.image_side = trained.data.image_side
-    pairs.paths, pairs.workers = cfg.paths, cfg.workers
-    problems = check_pairs(pairs)
-    if problems:
-        raise UserError("; ".join(problems))
-    typed = OmegaConf.to_object(pairs)
-    assert isinstance(typed, TrainConfig)
-    return PairsDataModule(
-        typed,
-        evaluation_views=settings.views,
-        evaluation_points=settings.points,
-        evaluation_batch_size=settings.batch_size,
-        workers=settings.trainer.workers,
-        progress=settings.progress,
-        only=settings.subset,
-    )
+def _metrics(result: Measurement, threshold: float) -> dict[str, float]:
+    values = summarise(result.rows)
+    pooled = {name: expected_calibration_error(sums) for name, sums in result.reliability.items()}
+    values["ece_pooled"] = sum(pooled.values()) / len(pooled)
+    values |= {f"ece_pooled/{name}": value for name, value in pooled.items()}
+    return {f"test/{name}": value for name, value in (values | {"threshold": threshold}).items()}
 
 
-def write_results(
-    folder: Path,
-    settings: EvaluateConfig,
-    step: int,
-    task: OccupancyTask,
-    data: PairsDataModule,
-    metrics: dict[str, float],
-) -> None:
-    """``metrics.json``, ``per_object.csv`` and, where files were left out, ``skipped.csv``."""
-    threshold = float(task.threshold)
-    rows = task.scores.rows(threshold)
-    assert data.prepared is not None
-    skipped = [vars(file) for file in data.prepared.skipped]
-    write_json(
-        folder / "metrics.json",
-        environment()
-        | {
-            "checkpoint": settings.checkpoint,
-            "step": step,
-            "parameters": sum(p.numel() for p in task.model.parameters()),
-            "subset": settings.subset,
-            "data": str(data.prepared.folder),
-            "objects": len(rows),
-            "views": settings.views,
-            "points": settings.points,
-            "threshold": threshold,
-            "control": vars(task.config.control),
-            "skipped": len(skipped),
-            "metrics": metrics,
-        },
-    )
-    write_csv(folder / "per_object.csv", rows)
-    if skipped:
-        write_csv(folder / "skipped.csv", skipped)
+def _name(cfg: DictConfig) -> dict[str, Any]:
+    return {"checkpoint": cfg.checkpoint} if cfg.baseline is None else {"baseline": plain(cfg.baseline)}
 
 
-def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Rows with the same keys as a CSV file."""
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
+def _config(cfg: DictConfig, settings: EvaluateConfig) -> dict[str, Any]:
+    """The settings; of the groups only those given on the command line, values that refer to others unresolved."""
+    own = cfg.copy()
+    groups = {name: OmegaConf.to_container(own[name], enum_to_str=True) for name in GROUPS if own[name]}
+    for name in GROUPS:
+        own[name] = None
+    return plain(own) | groups | {"subset": settings.subset}
 
 
-def write_examples(
-    folder: Path, settings: EvaluateConfig, task: OccupancyTask, data: PairsDataModule
-) -> None:
-    """Example meshes as GLB and pictures as PNG, left | right | predicted | true."""
-    rig = build_rig(data.pairs.rig, data.pairs.data.image_side)
-    for example in examples(data.evaluation_dataset(settings.subset), settings.examples):
-        views = task.seen(example.batch).views
-        predicted = reconstruct(task.model, views, float(task.threshold), settings.mesh_resolution)
-        name = f"{example.id.category}/{example.id.object_id}_view{example.id.view}"
-        for kind, mesh in (("predicted", predicted), ("true", example.true)):
-            if len(mesh.faces):
-                mesh.export(_inside(folder / "meshes", f"{name}_{kind}.glb"))
-        strip = comparison(views.left_BCHW[0], views.right_BCHW[0], predicted, example.true, rig)
-        Image.fromarray(strip).save(_inside(folder / "pictures", f"{name}.png"))
-
-
-def _inside(folder: Path, name: str) -> Path:
-    path = folder / name
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return path
+def _reliability(sums_3K: Any) -> list[list[float]]:
+    """Points, mean probability and share occupied of each bin that has points."""
+    return [[n, p / n, occupied / n] for n, p, occupied in sums_3K.T.tolist() if n]
 
 
 @entry_point("evaluate", check_evaluation)
@@ -198,8 +166,9 @@ def main(cfg: DictConfig) -> None:
     """Evaluate into Hydra's run folder and print where to look."""
     folder = Path(HydraConfig.get().runtime.output_dir)
     metrics = evaluate(cfg, folder)
-    for name in ("iou", "iou_bbox", "iou_unrotated"):
-        logger.info("test/%s %.4f", name, metrics[f"test/{name}"])
+    for name in ("iou", "iou_bbox", "iou_unrotated", "mesh_iou", "chamfer_l1", "f_score_1"):
+        if f"test/{name}" in metrics:
+            logger.info("test/%s %.4f", name, metrics[f"test/{name}"])
     logger.info("results, meshes and pictures are in %s", folder)
 
 

@@ -1,25 +1,30 @@
 """``metrics.json``: the result of a run as a file.
 
-Keys:
-    schema: 1.
-    stereo_occ, torch, python, cpu, threads: versions and hardware.
+Keys of every ``metrics.json``:
+    schema, protocol: versions of the file's form and of what the metrics mean.
+    stereo_occ, commit, dirty, torch, python, packages, cpu, threads: code, versions and hardware.
+    seconds: wall-clock since the start.
+
+Of a training besides:
     parameters: number of trained parameters.
-    seconds: wall-clock since the start of this process's training.
     threshold: decision threshold chosen on the validation objects at the best step.
     best: the entry of ``history`` with the highest ``val/iou``.
-    history: one entry per validation with ``step``, ``val/loss`` and the ``val/...`` metrics of the protocol.
+    history: one entry per validation with ``step``, ``val/loss`` and the ``val/...`` metrics of the protocol. A value
+        that is not finite is null and named in ``not_finite``.
+
+Those of an evaluation are in :mod:`stereo_occ.evaluate`.
 """
 
 import json
-import platform
+import math
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import torch
 from lightning.pytorch import Callback, LightningModule, Trainer
 
-from stereo_occ import __version__
+from stereo_occ.provenance import environment
 
 
 class WriteMetrics(Callback):
@@ -27,7 +32,7 @@ class WriteMetrics(Callback):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.history: list[dict[str, float]] = []
+        self.history: list[dict[str, Any]] = []
         self.start = time.monotonic()
 
     def state_dict(self) -> dict[str, Any]:
@@ -43,7 +48,7 @@ class WriteMetrics(Callback):
             name: float(value) for name, value in trainer.callback_metrics.items() if name.startswith("val/")
         }
         self.history = [entry for entry in self.history if entry["step"] < trainer.global_step]
-        self.history.append({"step": trainer.global_step, **values})
+        self.history.append({"step": trainer.global_step, **without_nan(values)})
         best = max(self.history, key=lambda entry: entry["val/iou"])
         write_json(
             self.path,
@@ -58,30 +63,19 @@ class WriteMetrics(Callback):
         )
 
 
-def environment() -> dict[str, Any]:
-    """Versions and hardware, for every results file."""
-    return {
-        "schema": 1,
-        "stereo_occ": __version__,
-        "torch": torch.__version__,
-        "python": platform.python_version(),
-        "cpu": cpu_model(),
-        "threads": torch.get_num_threads(),
-    }
-
-
-def cpu_model() -> str:
-    """The processor's own name where the system tells it."""
-    cpuinfo = Path("/proc/cpuinfo")
-    lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
-    return next(
-        (line.partition(":")[2].strip() for line in lines if line.startswith("model name")),
-        platform.machine(),
-    )
+def without_nan(values: Mapping[str, float]) -> dict[str, Any]:
+    """The values with null for those that are not finite, whose names are then listed under ``not_finite``."""
+    lost = [name for name, value in values.items() if not math.isfinite(value)]
+    return {**values, **dict.fromkeys(lost), **({"not_finite": lost} if lost else {})}
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write a JSON file whole or not at all."""
+    """Write a JSON file whole or not at all.
+
+    Raises:
+        ValueError: a number is NaN or infinite, which JSON does not know.
+    """
+    text = json.dumps(content, indent=2, allow_nan=False) + "\n"
     temporary = path.with_suffix(".part")
-    temporary.write_text(json.dumps(content, indent=2) + "\n")
+    temporary.write_text(text)
     temporary.replace(path)

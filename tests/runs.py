@@ -29,7 +29,7 @@ class Workshop:
 
     def evaluate(self, checkpoint: Path, folder: Path, *overrides: str) -> dict[str, float]:
         """Evaluate in this process with the views, points and batches of the validation."""
-        same = ["views=2", "points=500", "batch_size=4", "mesh_resolution=8", "examples=1"]
+        same = ["views=2", "points=500", "batch_size=4", "meshes=0", "mesh_resolution=8", "examples=1"]
         paths = [
             f"checkpoint='{checkpoint}'",
             f"paths.data={self.root / 'data'}",

@@ -1,9 +1,7 @@
 """IoU of many object-views, gathered batch by batch and summed up as the protocol says."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Mapping
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -18,9 +16,10 @@ THRESHOLDS = torch.linspace(0.05, 0.95, 19)
 
 
 class Scores:
-    """IoU at every candidate threshold, for each view and metric."""
+    """IoU at every candidate threshold (increasing probabilities), for each view and metric."""
 
-    def __init__(self) -> None:
+    def __init__(self, thresholds_T: Tensor = THRESHOLDS) -> None:
+        self.thresholds_T = thresholds_T
         self.ids: list[ViewId] = []
         self._iou: dict[str, list[Tensor]] = {name: [] for name in METRICS.values()}
 
@@ -28,12 +27,14 @@ class Scores:
         """Add a batch; ``logits`` holds ``(B, N)`` for each of the batch's query sets."""
         self.ids += batch.ids
         for queries, metric in METRICS.items():
-            iou_BT = iou_at_thresholds(logits[queries], batch.queries[queries].occupied_BN > 0.5, THRESHOLDS)
+            iou_BT = iou_at_thresholds(
+                logits[queries], batch.queries[queries].occupied_BN > 0.5, self.thresholds_T
+            )
             self._iou[metric].append(iou_BT.cpu())
 
     def best_threshold(self) -> float:
         """The candidate with the highest macro ``iou``: to be called on validation data only."""
-        return best_threshold(torch.cat(self._iou["iou"]), self._categories, THRESHOLDS)
+        return best_threshold(torch.cat(self._iou["iou"]), self._categories, self.thresholds_T)
 
     def summary(self, threshold: float) -> dict[str, float]:
         """``iou`` (macro), ``iou/all``, ``iou/<category>`` and likewise for the other metrics, at ``threshold``."""
@@ -44,28 +45,10 @@ class Scores:
             values |= {f"{metric}/{name}": mean for name, mean in means.items()}
         return values
 
-    def rows(self, threshold: float) -> list[dict[str, Any]]:
-        """One row per object: its mean IoU over the views."""
-        at_threshold = self._at(threshold)
-        objects = sorted({(view.category, view.object_id) for view in self.ids})
-        return [
-            {"category": category, "object_id": object_id}
-            | {
-                metric: float(np.mean([iou_V[i] for i in self._views_of(category, object_id)]))
-                for metric, iou_V in at_threshold.items()
-            }
-            for category, object_id in objects
-        ]
-
     @property
     def _categories(self) -> list[str]:
         return [view.category for view in self.ids]
 
-    def _views_of(self, category: str, object_id: str) -> Iterable[int]:
-        return (
-            i for i, view in enumerate(self.ids) if (view.category, view.object_id) == (category, object_id)
-        )
-
     def _at(self, threshold: float) -> dict[str, Tensor]:
-        column = int((THRESHOLDS - threshold).abs().argmin())
+        column = int((self.thresholds_T - threshold).abs().argmin())
         return {metric: torch.cat(parts)[:, column] for metric, parts in self._iou.items() if parts}

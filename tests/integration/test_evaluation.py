@@ -3,6 +3,7 @@
 import csv
 import json
 import shutil
+from itertools import product
 
 import numpy as np
 import pytest
@@ -48,7 +49,8 @@ def test_evaluating_repeats_the_validation_of_the_training(run, evaluation):
     _, metrics = evaluation
     best = json.loads((run / "metrics.json").read_text())["best"]
     expected = {name.removeprefix("val/"): value for name, value in best.items() if name.startswith("val/")}
-    measured = {name.removeprefix("test/"): value for name, value in metrics.items()}
+    del expected["loss"]
+    measured = {name: metrics[f"test/{name}"] for name in expected}
     assert measured == pytest.approx(expected, abs=1e-6)
 
 
@@ -75,9 +77,11 @@ def test_results_are_files(run, evaluation):
     assert results["threshold"] == json.loads((run / "metrics.json").read_text())["threshold"]
     assert (results["subset"], results["objects"], results["views"]) == ("val", 3, 2)
     table = rows(folder / "per_object.csv")
-    assert [row["category"] for row in table] == ["bottle", "bowl", "mug"]
-    for row in table:
-        assert float(row["iou"]) == pytest.approx(metrics[f"test/iou/{row['category']}"], abs=1e-6)
+    assert [(row["category"], row["view"]) for row in table] == list(product(("bottle", "bowl", "mug"), "01"))
+    for category in ("bottle", "bowl", "mug"):
+        values = [float(row["iou"]) for row in table if row["category"] == category]
+        assert np.mean(values) == pytest.approx(metrics[f"test/iou/{category}"], abs=1e-6)
+    assert {row["failure"] for row in table} == {""}
     assert not (folder / "skipped.csv").exists()
 
 
@@ -121,7 +125,7 @@ def test_a_folder_of_meshes(workshop, run, meshes, tmp_path):
     )
     results = json.loads((tmp_path / "metrics.json").read_text())
     assert (results["subset"], results["objects"], results["skipped"]) == ("all", 3, 2)
-    assert [row["object_id"] for row in rows(tmp_path / "per_object.csv")] == ["flat", "tall", "wide"]
+    assert [row["object_id"] for row in rows(tmp_path / "per_object.csv")[::2]] == ["flat", "tall", "wide"]
     reasons = {row["category"]: row["reason"] for row in rows(tmp_path / "skipped.csv")}
     assert reasons["bottle"].startswith("encloses no volume")
     assert "not a category" in reasons["vase"]

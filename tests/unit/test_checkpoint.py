@@ -13,7 +13,8 @@ from stereo_occ.cli import compose_config
 from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
 from stereo_occ.evaluate import load_weights
-from stereo_occ.metrics_file import environment, write_json
+from stereo_occ.metrics_file import write_json
+from stereo_occ.provenance import environment
 from stereo_occ.resume import AtomicCheckpoints, step_to_resume
 
 
@@ -127,7 +128,7 @@ def test_json_is_written_whole(tmp_path):
 
 def test_the_environment_names_versions():
     facts = environment()
-    assert facts["schema"] == 1
+    assert facts["schema"] == 2
     assert (facts["stereo_occ"], facts["torch"]) == (__version__, torch.__version__)
     assert facts["cpu"]
     assert facts["threads"] >= 1

@@ -150,7 +150,7 @@ def test_composing_in_code_reports_the_same_problems():
         ),
         (train.main, ["seed=0,1"], ["seed=0,1: gives several values; add -m to run them one after another"]),
         (train.main, ["-m", "seed=0,-1"], ["seed=-1: must be at least 0"]),
-        (evaluate.main, [], ["checkpoint: no value given; add checkpoint=..."]),
+        (evaluate.main, [], ["checkpoint: no value given; add checkpoint=... or baseline=..."]),
         (
             evaluate.main,
             ["checkpoint=no.ckpt"],

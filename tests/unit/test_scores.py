@@ -50,17 +50,18 @@ def test_each_metric_has_its_own_points():
     assert (summary["iou"], summary["iou_bbox"], summary["iou_unrotated"]) == (1, 0.5, 0)
 
 
-def test_rows_are_means_over_the_views_of_an_object_whatever_batch_they_came_in():
+def test_views_count_alike_whatever_batch_they_came_in():
     scores = Scores()
     scores.update(batch_of(("mug", "b", 0), ("bowl", "a", 0)), logits(RIGHT, WRONG))
     scores.update(batch_of(("mug", "a", 0), ("mug", "b", 1)), logits(HALF, WRONG))
-    rows = scores.rows(0.5)
-    assert [(row["category"], row["object_id"]) for row in rows] == [
-        ("bowl", "a"),
-        ("mug", "a"),
-        ("mug", "b"),
-    ]
-    assert [row["iou"] for row in rows] == [0, 0.5, 0.5]
+    assert scores.summary(0.5)["iou/mug"] == pytest.approx(0.5)
+
+
+def test_other_candidate_thresholds():
+    scores = Scores(torch.tensor([0.01, 0.02, 0.03]))
+    probability = torch.tensor([[0.025, 0.025, 0.015, 0.015]])
+    scores.update(batch_of(("mug", "a", 0)), dict.fromkeys(METRICS, torch.logit(probability)))
+    assert scores.best_threshold() == pytest.approx(0.02)
 
 
 def test_the_threshold_that_suits_a_timid_model():

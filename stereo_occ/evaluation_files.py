@@ -1,0 +1,49 @@
+"""The files that an evaluation leaves: ``per_object.csv``, example meshes and pictures.
+
+``per_object.csv`` has one row per object-view: ``category``, ``object_id``, ``view``, ``failure`` (``NaN``, ``empty
+mesh`` or ``no solid``; empty where there is none), then every metric of ``docs/metrics.md``, empty where it does not
+apply.
+"""
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from stereo_occ.data.dataset import EvaluationPairs
+from stereo_occ.data.examples import examples
+from stereo_occ.pictures import comparison
+from stereo_occ.predictors import ObjectView, Predictor
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Rows with the same keys as a CSV file; None is an empty cell."""
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def write_examples(
+    folder: Path, predictor: Predictor, dataset: EvaluationPairs, count: int, resolution: int
+) -> None:
+    """Meshes as GLB and pictures as PNG, left | right | predicted | true, of ``count`` objects of each category."""
+    shards = {(shard.category, shard.object_id): shard for shard in dataset.shards}
+    for example in examples(dataset, count):
+        views = example.batch.views
+        view = ObjectView(shards[example.id.category, example.id.object_id], example.id.view)
+        predicted = predictor.mesh(view, views, resolution)
+        name = f"{example.id.category}/{example.id.object_id}_view{example.id.view}"
+        for kind, mesh in (("predicted", predicted), ("true", example.true)):
+            if len(mesh.faces):
+                mesh.export(_inside(folder / "meshes", f"{name}_{kind}.glb"))
+        strip = comparison(views.left_BCHW[0], views.right_BCHW[0], predicted, example.true, view.rig)
+        Image.fromarray(strip).save(_inside(folder / "pictures", f"{name}.png"))
+
+
+def _inside(folder: Path, name: str) -> Path:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path
