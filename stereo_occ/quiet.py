@@ -11,6 +11,8 @@ BESIDE_THE_POINT = (
     "You're resuming from a checkpoint that ended before the epoch ended",
     # On a few cores loading in this process is faster.
     r"The '\w+_dataloader' does not have many workers",
+    # Jobs go to Slurm through Hydra's launcher, not through srun.
+    "The `srun` command is available on your system but is not used",
     # Lightning's own use of torch.
     "`isinstance\\(treespec, LeafSpec\\)` is deprecated",
 )
