@@ -56,7 +56,7 @@ figures: $(READY) ## the contact sheet of procedural objects
 
 lock: ## renew requirements.lock from pyproject.toml (needs uv)
 	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes \
-		--no-emit-index-url --no-header -o requirements.lock
+		--no-annotate --no-emit-index-url --no-header -o requirements.lock
 
 clean: ## remove the environment and caches, keep outputs/
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache

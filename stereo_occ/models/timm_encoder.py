@@ -57,7 +57,7 @@ class TimmEncoder(ImageEncoder):
     def forward(self, image_BCHW: Tensor) -> Tensor:
         """See :class:`ImageEncoder`."""
         maps = self.network((image_BCHW - self.mean_C11) / self.std_C11)[self.first :]
-        if self.network.output_fmt == "NHWC":
+        if getattr(self.network, "output_fmt", "NCHW") == "NHWC":  # not every family says it
             maps = [features_BHWC.permute(0, 3, 1, 2) for features_BHWC in maps]
         merged_BCHW: Tensor = maps[-1] if self.merge is None else self.merge(maps)
         return merged_BCHW
