@@ -134,6 +134,7 @@ def _code() -> str:
         "surface_colors.py",
         "inspection.py",
         "quality.py",
+        "distance.py",
         "repair/*.py",
         "../occupancy/*.py",
     )
