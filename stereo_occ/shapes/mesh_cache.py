@@ -139,5 +139,7 @@ def _code() -> str:
         "../occupancy/*.py",
     )
     parts = [path.read_bytes() for name in names for path in sorted(Path(__file__).parent.glob(name))]
-    libraries = [version(name) for name in ("trimesh", "manifold3d", "embreex", "scikit-image", "numpy", "scipy")]
+    libraries = [
+        version(name) for name in ("trimesh", "manifold3d", "embreex", "scikit-image", "numpy", "scipy")
+    ]
     return digest(b"".join([*parts, str(libraries + sorted(trimesh.available_formats())).encode()]))
