@@ -10,8 +10,8 @@ import torch
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.baselines.config import baseline_problems
-from stereo_occ.controls import CONTROLS
 from stereo_occ.data.config import SplitKind
+from stereo_occ.data.controls import CONTROLS
 from stereo_occ.data.look import check_look
 from stereo_occ.data.rigs import RigConfig, ToedInRigConfig, build_rig
 from stereo_occ.data.scene import draw_scene

@@ -12,8 +12,8 @@ from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from stereo_occ.baselines.config import BASELINE_SCHEMAS
-from stereo_occ.controls import ControlConfig
 from stereo_occ.data.config import DATA_SCHEMAS, DataConfig, SliceConfig
+from stereo_occ.data.controls import ControlConfig
 from stereo_occ.data.placement import PlacementConfig
 from stereo_occ.data.rigs import RIG_SCHEMAS, RigConfig, ToedInRigConfig
 from stereo_occ.errors import UserError
@@ -171,7 +171,9 @@ class TrainConfig(PairsConfig):
 class EvaluateConfig:
     """``python -m stereo_occ.evaluate``; what is null is taken from the checkpoint."""
 
-    checkpoint: str | None = None  # of the network to measure; with a baseline, of the run whose data is meant
+    checkpoint: str | None = (
+        None  # of the network to measure; with a baseline, of the run whose data is meant
+    )
     baseline: Any = None  # measured in place of a network
     training: list[str] = MISSING  # without a checkpoint: overrides of train.yaml that name the training data
     subset: str = MISSING  # train, val, test, all; auto: all of other meshes than the training's, else test

@@ -101,6 +101,7 @@ def _typed(pairs: DictConfig, cfg: DictConfig) -> TrainConfig:
 def _module(typed: TrainConfig, settings: EvaluateConfig, subset: str) -> PairsDataModule:
     return PairsDataModule(
         typed,
+        control=typed.control,
         evaluation_views=settings.views,
         evaluation_points=settings.points,
         evaluation_batch_size=settings.batch_size,

@@ -10,7 +10,6 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 
 from stereo_occ.checkpoint import KEY, VERSION
 from stereo_occ.config import TrainConfig
-from stereo_occ.controls import controlled
 from stereo_occ.data.batch import Batch
 from stereo_occ.metrics.scores import Scores
 from stereo_occ.models.base import OccupancyModel
@@ -39,12 +38,7 @@ class OccupancyTask(lightning.LightningModule):
         self.scores = Scores()
         self.register_buffer("threshold", torch.tensor(0.5))
 
-    def seen(self, batch: Batch) -> Batch:
-        """What the model is shown of ``batch``: all of it, but for the control that the run is under."""
-        return controlled(self.config.control, batch)
-
     def training_step(self, batch: Batch, batch_idx: int) -> Tensor:
-        batch = self.seen(batch)
         queries = batch.queries["train"]
         code = self.model.encode(batch.views)
         logits_BN = self.model.decode(code, queries.points_BN3)
@@ -54,7 +48,7 @@ class OccupancyTask(lightning.LightningModule):
         return loss
 
     def _evaluation_step(self, batch: Batch, stage: str) -> dict[str, Tensor]:
-        code = self.model.encode(self.seen(batch).views)
+        code = self.model.encode(batch.views)
         logits = {
             name: self.model.decode_all(code, q.points_BN3).float() for name, q in batch.queries.items()
         }

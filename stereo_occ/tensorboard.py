@@ -75,7 +75,7 @@ class ShowInTensorBoard(Callback):
         data = trainer.datamodule  # type: ignore[attr-defined]
         for example in examples(data.evaluation_dataset("val"), self.config.examples):
             name = f"example/{example.id.object_id}"
-            views = pl_module.seen(example.batch.to(pl_module.device)).views
+            views = example.batch.to(pl_module.device).views
             threshold = float(pl_module.threshold)
             predicted = reconstruct(pl_module.model, views, threshold, self.config.mesh_resolution)
             _add_mesh(writer, f"{name}/predicted", predicted, step)

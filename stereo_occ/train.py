@@ -57,6 +57,7 @@ def build_data(typed: TrainConfig) -> PairsDataModule:
     """The data of a training configuration."""
     data = PairsDataModule(
         typed,
+        control=typed.control,
         evaluation_views=typed.validation.views,
         evaluation_points=typed.validation.points,
         evaluation_batch_size=typed.batch_size,

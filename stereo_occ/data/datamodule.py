@@ -8,6 +8,7 @@ from torch.utils.data import DataLoader
 from stereo_occ.config import PairsConfig, QueriesConfig
 from stereo_occ.data.batch import Batch
 from stereo_occ.data.config import SplitKind
+from stereo_occ.data.controls import ControlConfig
 from stereo_occ.data.dataset import EvaluationPairs, ShuffledBatches, TrainingPairs
 from stereo_occ.data.objects import members
 from stereo_occ.data.prepare import PreparedShards, prepare
@@ -25,6 +26,7 @@ class PairsDataModule(lightning.LightningDataModule):
         evaluation_views: poses per object in validation and test.
         evaluation_points: query points per pose and metric.
         only: the one subset that will be asked for, so that no other is rendered.
+        control: that all batches are under.
     """
 
     def __init__(
@@ -36,6 +38,7 @@ class PairsDataModule(lightning.LightningDataModule):
         workers: int = 0,
         progress: bool = True,
         only: str = "all",
+        control: ControlConfig | None = None,
     ) -> None:
         super().__init__()
         self.pairs = pairs
@@ -45,6 +48,7 @@ class PairsDataModule(lightning.LightningDataModule):
         self.workers = workers
         self.progress = progress
         self.only = only
+        self.control = control or ControlConfig()
         self.prepared: PreparedShards | None = None
         self._training: dict[str, Any] = {}
 
@@ -87,7 +91,9 @@ class PairsDataModule(lightning.LightningDataModule):
         shards, views = self.subset("train")
         if not shards:
             raise UserError(f"data.name={self.pairs.data.name}: {NO_OBJECTS.format('train')}")
-        dataset = TrainingPairs(shards, views, settings["queries"], settings["points"], settings["seed"])
+        dataset = TrainingPairs(
+            shards, views, settings["queries"], settings["points"], settings["seed"], self.control
+        )
         first_step = self.trainer.global_step if self.trainer else 0
         batches = ShuffledBatches(
             len(dataset), settings["batch_size"], settings["steps"], settings["seed"], first_step
@@ -115,7 +121,7 @@ class PairsDataModule(lightning.LightningDataModule):
             raise UserError(
                 f"views={self.evaluation_views}: there are only {len(views)} of each object in {subset}; ask for fewer"
             )
-        return EvaluationPairs(shards, views[: self.evaluation_views], self.evaluation_points)
+        return EvaluationPairs(shards, views[: self.evaluation_views], self.evaluation_points, self.control)
 
     def _loader(self, dataset: TrainingPairs | EvaluationPairs, **kwargs: Any) -> DataLoader[Batch]:
         return DataLoader(

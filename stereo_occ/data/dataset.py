@@ -11,6 +11,7 @@ from torch.utils.data import Dataset, Sampler
 
 from stereo_occ.config import QueriesConfig
 from stereo_occ.data.batch import Batch, Queries, ViewId
+from stereo_occ.data.controls import ControlConfig, controlled
 from stereo_occ.data.shard import Shard
 from stereo_occ.models.base import StereoViews
 from stereo_occ.occupancy.queries import (
@@ -100,15 +101,23 @@ class TrainingPairs(PairsDataset):
     """Pairs with randomly drawn query points under the name ``train``."""
 
     def __init__(
-        self, shards: Sequence[Shard], views: Sequence[int], queries: QueriesConfig, points: int, seed: int
+        self,
+        shards: Sequence[Shard],
+        views: Sequence[int],
+        queries: QueriesConfig,
+        points: int,
+        seed: int,
+        control: ControlConfig | None = None,
     ) -> None:
         super().__init__(shards, views)
         ends = np.rint(np.cumsum([queries.box, queries.outside, queries.surface]) * points).astype(int)
         self.counts = dict(zip(("box", "outside", "surface"), np.diff(ends, prepend=0).tolist(), strict=True))
         self.seed = seed
+        self.control = control or ControlConfig()
 
     def __getitems__(self, draws: list[Draw]) -> Batch:
-        return self.batch([draw.item for draw in draws], [{"train": self._points(draw)} for draw in draws])
+        points = [{"train": self._points(draw)} for draw in draws]
+        return controlled(self.control, self.batch([draw.item for draw in draws], points))
 
     def _points(self, draw: Draw) -> LabelledPoints:
         shard, view = self.locate(draw.item)
@@ -134,12 +143,19 @@ class EvaluationPairs(PairsDataset):
     points of ``bbox`` left in the object frame, with the labels they have there: the suspected metric of the paper.
     """
 
-    def __init__(self, shards: Sequence[Shard], views: Sequence[int], points: int) -> None:
+    def __init__(
+        self,
+        shards: Sequence[Shard],
+        views: Sequence[int],
+        points: int,
+        control: ControlConfig | None = None,
+    ) -> None:
         super().__init__(shards, views)
         self.points = points
+        self.control = control or ControlConfig()
 
     def __getitems__(self, items: list[int]) -> Batch:
-        return self.batch(items, [self._points(item) for item in items])
+        return controlled(self.control, self.batch(items, [self._points(item) for item in items]))
 
     def _points(self, item: int) -> dict[str, LabelledPoints]:
         shard, view = self.locate(item)

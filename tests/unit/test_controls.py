@@ -8,8 +8,8 @@ import torch
 from rigs import random_pairs
 from scipy.spatial.transform import Rotation
 
-from stereo_occ.controls import CONTROLS, ControlConfig, axes_of, controlled
 from stereo_occ.data.batch import Batch, Queries, ViewId
+from stereo_occ.data.controls import CONTROLS, ControlConfig, axes_of, controlled
 
 
 def batch_of(count, seed=0):
