@@ -44,8 +44,8 @@ class StereoRenderer:
     """Renders one object at a time, in any number of poses, rigs and appearances.
 
     Args:
-        supersampling: samples along each side of a pixel; 2 equals OpenGL's own 4x multisampling at silhouettes
-            (PSNR 23.9 dB against 24.1 dB at 64 pixels) in less time.
+        supersampling: samples along each side of a pixel; 2 is closer to the truth at outlines than OpenGL's 4x
+            multisampling (PSNR 25.8 dB against 25.0 dB at 64 pixels; experiments/antialiasing) in half the time.
     """
 
     def __init__(self, supersampling: int = 2) -> None:
