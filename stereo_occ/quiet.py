@@ -13,6 +13,8 @@ BESIDE_THE_POINT = (
     r"The '\w+_dataloader' does not have many workers",
     # Jobs go to Slurm through Hydra's launcher, not through srun.
     "The `srun` command is available on your system but is not used",
+    # A run is one process, on a machine with Slurm as on any other.
+    "The `srun` command is available on your system but is not used",
     # Lightning's own use of torch.
     "`isinstance\\(treespec, LeafSpec\\)` is deprecated",
 )

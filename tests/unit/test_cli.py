@@ -40,7 +40,7 @@ MISTAKES = [
     ("data.counts.cup=1", "data.counts.cup: unknown key; known in data.counts: mug, bowl, bottle"),
     ("hydra.rnu.dir=x", "hydra.rnu.dir: unknown key; did you mean hydra.run?"),
     ("scale=lptop", "scale=lptop: unknown choice; did you mean laptop?"),
-    ("scale=null", "scale=null: unknown choice; known: laptop, paper, smoke"),
+    ("scale=null", "scale=null: unknown choice; known: laptop, paper, paper_640k, smoke"),
     ("optimizer=sgd", "optimizer=sgd: unknown choice; known: adam, adamw"),
     ("model/encoder=resnet", "model/encoder=resnet: unknown choice; did you mean"),
     ("steps", "steps: cannot be read; write key=value"),
