@@ -3,6 +3,7 @@
 ``metrics.json`` has the keys of :mod:`stereo_occ.metrics_file` and:
     predictor: ``checkpoint`` or ``baseline`` with its settings.
     step, parameters: of the network; null for a baseline.
+    control: what the network was shown, see :mod:`stereo_occ.data.controls`.
     config: the settings of the evaluation.
     subset, data, objects, views, points: what was measured, and the folder of its shards.
     split: ``hash`` of the names of training and evaluated objects, see :func:`~stereo_occ.provenance.split_hash`.

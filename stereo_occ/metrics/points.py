@@ -9,11 +9,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from torch.nn.functional import binary_cross_entropy_with_logits
 
 from stereo_occ.metrics.calibration import brier, expected_calibration_error, reliability
 from stereo_occ.metrics.regions import REGIONS
 from stereo_occ.metrics.scores import METRICS
 from stereo_occ.metrics.volumetric import iou_at_thresholds
+
+#: Of a failed view: binary cross entropy where torch cuts it off.
+WORST_LOSS = 100.0
 
 #: The suffix of the calibration metrics on each set of points.
 _CALIBRATED = {"cube": "", "bbox": "_bbox"}
@@ -27,6 +31,8 @@ def point_metrics(
         metric: _iou(logits[queries], occupied[queries], threshold) for queries, metric in METRICS.items()
     }
     values["iou_at_0.5"] = _iou(logits["cube"], occupied["cube"], 0.5)
+    loss = binary_cross_entropy_with_logits(logits["bbox"], occupied["bbox"].float())
+    values["loss"] = WORST_LOSS if loss.isnan() else float(loss)
     for queries, suffix in _CALIBRATED.items():
         failed = bool(logits[queries].isnan().any())
         probability_N, occupied_N = _probability(logits[queries]), occupied[queries].numpy()

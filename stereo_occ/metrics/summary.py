@@ -20,6 +20,7 @@ METRICS = {
     "brier_bbox": False,
     "ece": False,
     "ece_bbox": False,
+    "loss": False,
     "mesh_iou": True,
     "chamfer_l1": False,
     "chamfer_l1_x10": False,

@@ -49,7 +49,6 @@ def test_evaluating_repeats_the_validation_of_the_training(run, evaluation):
     _, metrics = evaluation
     best = json.loads((run / "metrics.json").read_text())["best"]
     expected = {name.removeprefix("val/"): value for name, value in best.items() if name.startswith("val/")}
-    del expected["loss"]
     measured = {name: metrics[f"test/{name}"] for name in expected}
     assert measured == pytest.approx(expected, abs=1e-6)
 

@@ -1,0 +1,98 @@
+"""Evaluations read back from their folders."""
+
+import csv
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from glob import glob
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereo_occ.errors import UserError
+from stereo_occ.metrics.summary import METRICS, ROW_KEYS
+from stereo_occ.provenance import SCHEMA
+
+#: Category, object, view.
+Key = tuple[str, str, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluations:
+    """Evaluations of one model from several training seeds, on the same object-views.
+
+    Attributes:
+        name: as asked for.
+        keys: the V object-views, in order.
+        values: of each metric that applies to any of them ``(S, V)``; NaN where it does not.
+        facts: of the first one's ``metrics.json``.
+    """
+
+    name: str
+    folders: list[Path]
+    keys: list[Key]
+    values: dict[str, NDArray[np.float64]]
+    facts: dict[str, Any]
+
+
+def read_evaluations(pattern: str) -> Evaluations:
+    """The evaluations in a folder, or in the folders that a pattern names.
+
+    Raises:
+        UserError: there is none, one is of another version, or they are not of the same object-views.
+    """
+    found = [pattern] if Path(pattern).is_dir() else sorted(glob(pattern))  # noqa: PTH207 (it may be absolute)
+    folders = [Path(path) for path in found if Path(path).is_dir()]
+    if not folders:
+        raise UserError(f"{pattern}: no such folder; give the folder of an evaluation")
+    facts = [_facts(folder) for folder in folders]
+    tables = [_table(folder) for folder in folders]
+    keys = sorted(tables[0])
+    for folder, rows in zip(folders, tables, strict=True):
+        if sorted(rows) != keys:
+            raise UserError(
+                f"{pattern}: {folder} has other object-views than {folders[0]}; compare them one by one"
+            )
+    values = {
+        metric: np.array([[rows[key].get(metric, np.nan) for key in keys] for rows in tables])
+        for metric in METRICS
+    }
+    return Evaluations(
+        pattern,
+        folders,
+        keys,
+        {metric: of_metric for metric, of_metric in values.items() if np.isfinite(of_metric).any()},
+        facts[0],
+    )
+
+
+def _facts(folder: Path) -> dict[str, Any]:
+    try:
+        facts: dict[str, Any] = json.loads((folder / "metrics.json").read_text())
+    except (OSError, ValueError) as error:
+        raise UserError(
+            f"{folder}: has no readable metrics.json; give the folder of an evaluation"
+        ) from error
+    if facts.get("schema") != SCHEMA or "subset" not in facts:
+        raise UserError(
+            f"{folder}/metrics.json: is no evaluation of form {SCHEMA}; evaluate the checkpoint again"
+        )
+    return facts
+
+
+def _table(folder: Path) -> dict[Key, dict[str, float]]:
+    try:
+        with (folder / "per_object.csv").open(newline="") as file:
+            rows: Sequence[dict[str, str]] = list(csv.DictReader(file))
+        return {
+            (row["category"], row["object_id"], int(row["view"])): {
+                name: float(cell) for name, cell in row.items() if name in METRICS and cell
+            }
+            for row in rows
+        }
+    except (OSError, KeyError, ValueError) as error:
+        raise UserError(
+            f"{folder}: has no per_object.csv with {', '.join(ROW_KEYS)}; evaluate the checkpoint again"
+        ) from error

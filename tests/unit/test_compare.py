@@ -1,0 +1,141 @@
+"""``python -m stereo_occ.compare`` on small result folders."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+from samples import single_line
+
+from stereo_occ import compare
+from stereo_occ.provenance import PROTOCOL, SCHEMA
+
+FACTS = {
+    "schema": SCHEMA,
+    "protocol": PROTOCOL,
+    "subset": "test",
+    "views": 2,
+    "points": 100,
+    "meshes": {"views": 0},
+}
+FACTS |= {"split": {"hash": "a"}, "commit": None, "data": "x"}
+
+
+def evaluation(folder, iou_of, objects=6, **facts):
+    """Two views of mugs and of bowls; bowls have no handle."""
+    folder.mkdir(parents=True)
+    (folder / "metrics.json").write_text(json.dumps(FACTS | facts))
+    with (folder / "per_object.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(
+            file, ["category", "object_id", "view", "failure", "iou", "handle_recall", "mesh_iou"]
+        )
+        writer.writeheader()
+        for category in ("mug", "bowl"):
+            for index in range(objects):
+                for view in range(2):
+                    iou = iou_of(category, index, view)
+                    handle = iou / 2 if category == "mug" else ""
+                    row = {"category": category, "object_id": f"{category}_{index}", "view": view}
+                    writer.writerow(
+                        row | {"failure": "", "iou": iou, "handle_recall": handle, "mesh_iou": ""}
+                    )
+    return folder
+
+
+def hard(category, index, view):
+    return 0.1 * index + 0.05 * view + (0.2 if category == "bowl" else 0)
+
+
+def run(tmp_path, capsys, a, b, *more):
+    compare.main([str(a), str(b), "--output", str(tmp_path / "out"), "--draws", "300", *more])
+    return capsys.readouterr().out, json.loads((tmp_path / "out" / "comparison.json").read_text())
+
+
+def refusal(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        compare.main([str(argument) for argument in arguments])
+    assert stop.value.code == 2
+    return capsys.readouterr().err
+
+
+def test_a_constant_gain(tmp_path, capsys):
+    a = evaluation(tmp_path / "a", lambda *view: hard(*view) + 0.1)
+    b = evaluation(tmp_path / "b", hard)
+    printed, record = run(tmp_path, capsys, a, b)
+    macro = record["results"]["iou"]["macro"]
+    assert (macro["difference"], macro["low"], macro["high"]) == pytest.approx((0.1, 0.1, 0.1))
+    assert macro["clear"]
+    assert set(record["results"]) == {"iou", "handle_recall"}  # what neither has is left out
+    assert set(record["results"]["handle_recall"]) == {"mug", "macro"}
+    assert record["results"]["handle_recall"]["macro"]["difference"] == pytest.approx(0.05)
+    assert "[+0.1000, +0.1000] *" in printed
+    with Image.open(tmp_path / "out" / "comparison.png") as picture:
+        assert picture.width > 1000
+
+
+def test_several_seeds_by_a_pattern(tmp_path, capsys):
+    for seed, gain in enumerate((0.0, 0.1, 0.2)):
+        evaluation(tmp_path / f"a_seed{seed}", lambda *view, gain=gain: hard(*view) + gain)
+    b = evaluation(tmp_path / "b", hard)
+    _, record = run(tmp_path, capsys, tmp_path / "a_seed*", b)
+    assert len(record["a"]) == 3
+    macro = record["results"]["iou"]["macro"]
+    assert macro["difference"] == pytest.approx(0.1)
+    assert macro["high"] - macro["low"] > 0.1  # from the seeds alone: objects add nothing
+
+
+def test_only_the_asked_metrics(tmp_path, capsys):
+    a, b = evaluation(tmp_path / "a", hard), evaluation(tmp_path / "b", hard)
+    _, record = run(tmp_path, capsys, a, b, "--metrics", "iou")
+    assert list(record["results"]) == ["iou"]
+    assert record["results"]["iou"]["macro"]["clear"] is False
+
+
+def test_other_training_objects_are_noted(tmp_path, capsys):
+    a = evaluation(tmp_path / "a", hard)
+    b = evaluation(tmp_path / "b", hard, split={"hash": "b"})
+    printed, record = run(tmp_path, capsys, a, b)
+    assert record["notes"] == ["split differs: {'hash': 'a'} | {'hash': 'b'}"]
+    assert "note: split differs" in printed
+
+
+@pytest.mark.parametrize(
+    ("facts", "complaint"),
+    [
+        (
+            {"objects": 5},
+            "4 object-views are only in the first and 0 only in the second, such as bowl/bowl_5/0",
+        ),
+        ({"points": 200}, "were measured with points 100 and 200"),
+        ({"protocol": 0}, f"were measured with protocol {PROTOCOL} and 0"),
+        ({"schema": 1}, "metrics.json: is no evaluation of form 2"),
+    ],
+)
+def test_what_cannot_be_compared_is_one_line(tmp_path, capsys, facts, complaint):
+    a, b = evaluation(tmp_path / "a", hard), evaluation(tmp_path / "b", hard, **facts)
+    message = refusal(capsys, a, b, "--output", tmp_path / "out")
+    assert complaint in message
+    assert single_line(message.rstrip("\n").replace(str(tmp_path), ""))
+    assert not (tmp_path / "out").exists()
+
+
+def test_folders_that_are_not_there(tmp_path, capsys):
+    a = evaluation(tmp_path / "a", hard)
+    assert "no such folder; give the folder of an evaluation" in refusal(capsys, a, tmp_path / "nowhere")
+    (tmp_path / "empty").mkdir()
+    assert "has no readable metrics.json" in refusal(capsys, a, tmp_path / "empty")
+    assert "--metrics iuo: not in both results" in refusal(capsys, a, a, "--metrics", "iuo")
+    assert "quote a pattern" in refusal(capsys, a, a, a)
+
+
+def test_ten_thousand_draws_of_many_objects_are_one_product(tmp_path, capsys):
+    """The default draws; the interval of noise around no difference holds 0."""
+    rng = np.random.default_rng(0)
+    a = evaluation(tmp_path / "a", lambda *view: hard(*view) + rng.normal(0, 0.1), objects=40)
+    b = evaluation(tmp_path / "b", hard, objects=40)
+    _, record = run(tmp_path, capsys, a, b, "--draws", "10000")
+    macro = record["results"]["iou"]["macro"]
+    assert record["draws"] == 10_000
+    assert macro["low"] < macro["difference"] < macro["high"]
+    assert macro["high"] - macro["low"] == pytest.approx(3.92 * 0.1 / np.sqrt(160), rel=0.25)
