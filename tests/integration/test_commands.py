@@ -1,4 +1,4 @@
-"""Every command in the README is one that works."""
+"""Every command in the README and on the page about clusters is one that works."""
 
 import re
 import shlex
@@ -12,7 +12,14 @@ from stereo_occ.checks import check_evaluation, check_pairs, check_rendering, ch
 from stereo_occ.problems import find_problems
 
 CHECKOUT = Path(stereo_occ.__file__).parents[1]
-CHECKS = {"train": check_training, "evaluate": check_evaluation, "render": check_rendering, "inspect": check_pairs}
+CHECKS = {
+    "train": check_training,
+    "evaluate": check_evaluation,
+    "render": check_rendering,
+    "inspect": check_pairs,
+}
+
+WITHOUT_ARGUMENTS = {"doctor"}
 
 
 def code_lines(text):
@@ -22,7 +29,8 @@ def code_lines(text):
 
 
 def commands():
-    lines = code_lines((CHECKOUT / "README.md").read_text())
+    pages = [CHECKOUT / "README.md", CHECKOUT / "docs" / "cluster.md"]
+    lines = [line for page in pages for line in code_lines(page.read_text())]
     return [line for line in lines if "python -m stereo_occ" in line]
 
 
@@ -46,6 +54,9 @@ def test_a_command_of_the_readme_composes_without_problems(command, tmp_path, mo
     assert words[:2] == ["python", "-m"]
     package, program = words[2].split(".")
     assert package == "stereo_occ"
+    if program in WITHOUT_ARGUMENTS:
+        assert words[3:] == []
+        return
     assert program in CHECKS, f"no test knows {words[2]}"
     (tmp_path / "x.ckpt").touch()
     overrides = []

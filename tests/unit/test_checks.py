@@ -6,7 +6,7 @@ import yaml
 from omegaconf import OmegaConf
 from samples import single_line
 
-from stereo_occ.checks import check_evaluation, check_pairs, check_training
+from stereo_occ.checks import check_evaluation, check_pairs, check_rendering, check_training
 from stereo_occ.cli import compose_config
 from stereo_occ.problems import find_problems
 
@@ -125,6 +125,20 @@ def test_a_mesh_folder_must_exist(tmp_path):
         (problem,) = find_problems(program, overrides, check)
         assert problem.startswith(f"data.root={tmp_path / 'nowhere'}: no such folder")
     assert find_problems("render", ["data=meshes", f"data.root={tmp_path}"], check_pairs) == []
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        (["slice.of=4", "slice.index=5"], ["slice.index=5: must be 1 to slice.of=4"]),
+        (["slice.index=0"], ["slice.index=0: must be 1 to slice.of=1"]),
+        (["slice.of=0"], ["slice.of=0: must be at least 1"]),
+        (["slice.of=3", "slice.index=1,2,3,4"], ["slice.index=4: must be 1 to slice.of=3"]),
+        (["slice.of=3", "slice.index=range(1,4)"], []),
+    ],
+)
+def test_slices_are_counted_from_one(overrides, expected):
+    assert find_problems("render", overrides, check_rendering) == expected
 
 
 def test_rendering_needs_no_division_into_subsets():
