@@ -35,12 +35,13 @@ def shipped() -> list[str]:
 
 
 def find_weights(name: str) -> Path | None:
-    """The ``.safetensors`` file that a path or the name of shipped weights stands for; None if it is neither."""
+    """The ``.safetensors`` file of a path, with or without that suffix, or of shipped weights' name; else None."""
     path = Path(name)
     if path.suffix == SUFFIX:
         return path
-    packaged = FOLDER / f"{name}{SUFFIX}"
-    return packaged if path.name == name and packaged.is_file() and not path.is_file() else None
+    folders = (path.parent, *([FOLDER] if path.name == name else []))
+    files = [folder / f"{path.name}{SUFFIX}" for folder in folders]
+    return None if path.is_file() else next((file for file in files if file.is_file()), None)
 
 
 def read_weights(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:

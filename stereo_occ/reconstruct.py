@@ -60,7 +60,9 @@ def reconstruct_pair(cfg: DictConfig) -> Reconstruction:
     assert isinstance(settings, ReconstructConfig)
     if settings.threads:
         torch.set_num_threads(settings.threads)
-    reconstructor = Reconstructor.from_checkpoint(settings.checkpoint, settings.backend.value)
+    reconstructor = Reconstructor.from_checkpoint(
+        settings.checkpoint, settings.backend.value, settings.threads
+    )
     result = reconstructor(
         settings.left,
         settings.right,

@@ -95,7 +95,8 @@ class Reconstruction:
     def preview(self) -> NDArray[np.uint8]:
         """RGB: both photographs with the mesh's outline, and the parts of them that the model was given."""
         boxes = None if self.found is None else [part.box for part in self.found]
-        return preview(self.mesh, self.pair, self.images, boxes, self.framing.cameras)
+        below_a_pixel = simplified(self.mesh, self.unit / 500)
+        return preview(below_a_pixel, self.pair, self.images, boxes, self.framing.cameras)
 
     def description(self) -> dict[str, Any]:
         """Plain values for a JSON file."""
@@ -138,11 +139,14 @@ class Reconstructor:
         self.config, self.predict, self.threshold, self.name = config, predict, threshold, name
 
     @classmethod
-    def from_checkpoint(cls, checkpoint: str | Path, backend: str = "torch") -> Self:
+    def from_checkpoint(
+        cls, checkpoint: str | Path, backend: str = "torch", threads: int | None = None
+    ) -> Self:
         """Of a run's ``best.ckpt``, exported ``.safetensors``, or the name of shipped weights.
 
         Args:
             backend: ``torch``; or ``onnx``, for what ``python -m stereo_occ.export onnx=true`` wrote.
+            threads: of ONNX Runtime; torch has ``torch.set_num_threads``.
 
         Raises:
             UserError: it cannot be read.
@@ -150,7 +154,7 @@ class Reconstructor:
         if backend == "onnx":
             from stereo_occ.onnx_model import load_onnx  # needs the extra onnx
 
-            trained: Any = load_onnx(str(checkpoint))
+            trained: Any = load_onnx(str(checkpoint), threads)
         else:
             trained = load_trained(str(checkpoint))
         return cls(trained.config, trained.predict, trained.threshold, trained.name)

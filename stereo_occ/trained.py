@@ -12,7 +12,7 @@ from stereo_occ.data.rigs import build_rig
 from stereo_occ.errors import UserError
 from stereo_occ.models.base import OccupancyModel, StereoViews
 from stereo_occ.models.build import build_model
-from stereo_occ.packaged import shipped
+from stereo_occ.packaged import find_weights, shipped
 from stereo_occ.reconstruction import Occupancy, occupancy_of
 
 #: What a stereo pair (``B = 1``) makes of a model.
@@ -47,9 +47,9 @@ def load_trained(name: str) -> TrainedModel:
     Raises:
         UserError: there is no such file, or it is none of these.
     """
-    if not Path(name).suffix and not Path(name).exists() and name not in shipped():
+    if not Path(name).is_file() and find_weights(name) is None:
         raise UserError(
-            f"checkpoint={name}: no such file, and of that name no weights are shipped "
+            f"checkpoint={name}: no such file, nor the name of shipped weights "
             f"({', '.join(shipped()) or 'there are none'}); give the best.ckpt of a training run"
         )
     checkpoint = read_checkpoint(Path(name))

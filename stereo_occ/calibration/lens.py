@@ -63,22 +63,29 @@ class Lens:
         """
         if self.ideal:
             return points_N2
-        ideal_N2, step = points_N2.copy(), 1e-6
+        ideal_N2 = points_N2.copy()
         for _ in range(50):
             error_N2 = self.distort(ideal_N2) - points_N2
             if np.abs(error_N2).max(initial=0) < 1e-10:
-                return ideal_N2
-            columns = [
-                (self.distort(ideal_N2 + shift_2) - self.distort(ideal_N2 - shift_2)) / (2 * step)
-                for shift_2 in step * np.eye(2)
-            ]
-            ideal_N2 = ideal_N2 - np.linalg.solve(np.stack(columns, axis=-1), error_N2[..., None])[..., 0]
-        if np.abs(self.distort(ideal_N2) - points_N2).max(initial=0) < 1e-6:
+                break
+            ideal_N2 = ideal_N2 - np.linalg.solve(self._slope(ideal_N2), error_N2[..., None])[..., 0]
+        near = np.abs(self.distort(ideal_N2) - points_N2).max(initial=0) < 1e-6
+        # Beyond the radius where the image folds back there are solutions, too, that no light takes.
+        unfolded = (np.linalg.det(self._slope(ideal_N2)) > 0) & ((ideal_N2 * points_N2).sum(axis=1) >= 0)
+        if near and unfolded.all():
             return ideal_N2
         raise UserError(
             "distortion: cannot be removed where the object is; are the coefficients in OpenCV's order "
             "(k1, k2, p1, p2, k3)?"
         )
+
+    def _slope(self, points_N2: NDArray[np.float64], step: float = 1e-6) -> NDArray[np.float64]:
+        """Derivatives ``(N, 2, 2)`` of what :meth:`distort` gives."""
+        columns = [
+            (self.distort(points_N2 + shift_2) - self.distort(points_N2 - shift_2)) / (2 * step)
+            for shift_2 in step * np.eye(2)
+        ]
+        return np.stack(columns, axis=-1)
 
     def _radial(self, points_N2: NDArray[np.float64]) -> NDArray[np.float64]:
         k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = np.pad(self.coefficients, (0, 12))[:12]

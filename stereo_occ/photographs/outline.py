@@ -76,7 +76,7 @@ def _outlined(
     height, width = image_HW3.shape[:2]
     facing_F = np.einsum("fi,fi->f", mesh.face_normals, center_3 - mesh.triangles_center) > 0
     mask_HW = silhouette(pixels_V2, mesh.faces, facing_F, width, height)
-    line_HW = binary_dilation(mask_HW, np.ones((3, 3))) & ~mask_HW
+    line_HW = binary_dilation(mask_HW, np.ones((5, 5))) & ~mask_HW
     drawn = image_HW3.copy()
     drawn[line_HW] = COLOR
     return drawn

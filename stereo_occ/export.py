@@ -1,0 +1,84 @@
+"""``python -m stereo_occ.export``: a run's weights as files of numbers alone, with a model card; ONNX on demand."""
+
+import json
+import logging
+from pathlib import Path
+from typing import Any
+
+from omegaconf import DictConfig, OmegaConf
+
+from stereo_occ.checkpoint import KEY, VERSION, read_checkpoint
+from stereo_occ.cli import entry_point
+from stereo_occ.errors import UserError
+from stereo_occ.inference_config import ExportConfig
+from stereo_occ.mesh_output import write_whole
+from stereo_occ.model_card import model_card, training_command
+from stereo_occ.onnx_export import export_onnx
+from stereo_occ.packaged import SUFFIX, write_weights
+from stereo_occ.trained import load_trained
+
+logger = logging.getLogger(__name__)
+
+
+def check_export(cfg: DictConfig) -> list[str]:
+    """Problems of a configuration, its checkpoint unread."""
+    if cfg.output.endswith((SUFFIX, ".json", ".md", ".onnx", "/")):
+        return [f"output={cfg.output}: must be a path without a suffix, such as my_weights"]
+    return []
+
+
+def export(cfg: DictConfig) -> list[Path]:
+    """Write ``OUTPUT.safetensors``, ``.json``, ``.md`` and, with ``onnx=true``, two ``.onnx`` files.
+
+    Raises:
+        UserError: the checkpoint or the metrics cannot be read, or a file cannot be written.
+    """
+    settings = OmegaConf.to_object(cfg)
+    assert isinstance(settings, ExportConfig)
+    trained = load_trained(settings.checkpoint)
+    checkpoint = read_checkpoint(Path(settings.checkpoint))
+    run, prefix = Path(settings.checkpoint).parent, Path(settings.output)
+    description = {
+        "version": VERSION,
+        "step": trained.step,
+        "threshold": trained.threshold,
+        "metrics": _metrics(settings.metrics, run),
+        "config": checkpoint[KEY]["config"],
+    }
+    # OUTPUT may hold dots: v1.2 is no suffix.
+    weights, card = (prefix.with_name(prefix.name + suffix) for suffix in (SUFFIX, ".md"))
+    write_weights(weights, description, checkpoint["state_dict"], settings.half)
+    parameters = sum(parameter.numel() for parameter in trained.model.parameters())
+    text = model_card(prefix.name, description, parameters, weights.stat().st_size, training_command(run))
+    write_whole(card, text.encode())
+    written = [weights, weights.with_suffix(".json"), card]
+    if settings.onnx:
+        model = load_trained(
+            str(weights)
+        ).model  # with the rounding of half precision, as the weights beside it
+        written += export_onnx(model, trained.config.data.image_side, prefix)
+    return written
+
+
+def _metrics(path: str | None, run: Path) -> dict[str, Any]:
+    """Of an evaluation's ``metrics.json``, or a training's best validation."""
+    file = Path(path) if path else run / "metrics.json"
+    if path is None and not file.is_file():
+        return {}
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        metrics: dict[str, Any] = content["metrics"] if "metrics" in content else content["best"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise UserError(f"metrics={file}: cannot be read; give the metrics.json of an evaluation") from error
+    return metrics
+
+
+@entry_point("export", check_export)
+def main(cfg: DictConfig) -> None:
+    """Export and say what was written."""
+    for path in export(cfg):
+        logger.info("%s (%.1f MB)", path, path.stat().st_size / 1e6)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""The page that goes with exported weights: what they are, from what, how good and what not."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+
+def model_card(
+    name: str, description: Mapping[str, Any], parameters: int, size: int, command: str | None
+) -> str:
+    """Markdown, from the training's configuration and the metrics of an evaluation.
+
+    Args:
+        name: of the weights.
+        description: what is in their JSON file.
+        parameters: of the model.
+        size: of the weights' file, bytes.
+        command: that trained it, where it is known.
+    """
+    config = description["config"]
+    data, categories = config["data"], config["categories"]["names"]
+    lines = [
+        f"# {name}",
+        "",
+        f"`model={config['model']['name']}`, {parameters / 1e6:.1f} M parameters, {size / 1e6:.1f} MB, "
+        f"images of {data['image_side']} pixels, decision threshold {description['threshold']:.2f}.",
+        "",
+        "## Use",
+        "```",
+        f"python -m stereo_occ.reconstruct left=L.png right=R.png rig=rig.yaml checkpoint={name} output=mug.glb",
+        "```",
+        "",
+        "## Training",
+        f"{description['step']} steps on {', '.join(categories)} of `data={data['name']}` with "
+        f"`rig={config['rig'].get('kind', 'toed_in')}`, `placement={config['placement']['kind']}`; rendered pictures "
+        f"alone, {data['views']} pairs of each object. The whole configuration is in `{name}.json`.",
+        *(["```", command, "```"] if command else []),
+        "",
+        "## Metrics",
+        *_table(description.get("metrics") or {}),
+        "",
+        "## Limits",
+        "- Trained on the categories named above alone: anything else comes out as something like them.",
+        "- Trained on rendered pictures: photographs differ in light, material, background and sensor.",
+        "- What neither camera sees is a guess from the shapes of the training.",
+        *_rig_limits(config),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def training_command(folder: Path) -> str | None:
+    """The command of a run, from the overrides that Hydra noted in its folder."""
+    notes = folder / ".hydra" / "overrides.yaml"
+    if not notes.is_file():
+        return None
+    words = [line.removeprefix("- ").strip() for line in notes.read_text(encoding="utf-8").splitlines()]
+    return " ".join(["python -m stereo_occ.train", *(word for word in words if word not in ("[]", ""))])
+
+
+def _table(metrics: Mapping[str, Any]) -> list[str]:
+    rows = [
+        f"| `{name}` | {value:.4f} |" for name, value in metrics.items() if isinstance(value, int | float)
+    ]
+    return ["| metric | value |", "|---|---|", *rows] if rows else ["Not evaluated."]
+
+
+def _rig_limits(config: Mapping[str, Any]) -> list[str]:
+    rig = config["rig"]
+    if rig.get("kind") == "rectified":
+        low, high = rig["distance"]
+        return [
+            f"- Baselines of {rig['baseline'][0]} to {rig['baseline'][1]} m, objects {low} to {high} m away, "
+            f"{rig['diagonal'][0]} to {rig['diagonal'][1]} m large."
+        ]
+    return ["- Needs cameras that look at one point, arranged as in training; the object is there."]
