@@ -22,7 +22,7 @@ class MeanShape(Baseline):
     """
 
     def __init__(self, occupancy_CCC: NDArray[np.float64], threshold: float = 0.5) -> None:
-        self.occupancy_CCC = occupancy_CCC
+        self.occupancy_CCC = occupancy_CCC.clip(0, 1)
         self.threshold = threshold
 
     def look(self, view: ObjectView) -> Field:
@@ -39,7 +39,8 @@ class MeanShape(Baseline):
 def mean_occupancy(views: Iterable[ObjectView], cells: int) -> NDArray[np.float64]:
     """Mean occupancy of each cell of the working cube over views, from the occupied points of their box pools.
 
-    A pool's points are uniform in the object's box, so each stands for the same volume.
+    A pool's points are uniform in the object's box, so each stands for the same volume. Of few points, what should be 1
+    may come out a little above it.
 
     Raises:
         ValueError: there are no views.
@@ -56,4 +57,4 @@ def mean_occupancy(views: Iterable[ObjectView], cells: int) -> NDArray[np.float6
         count += 1
     if not count:
         raise ValueError("the mean shape of no views")
-    return (volume_C * cells**3 / count).clip(0, 1).reshape((cells,) * 3)
+    return (volume_C * cells**3 / count).reshape((cells,) * 3)
