@@ -46,6 +46,7 @@ def check_training(cfg: DictConfig) -> list[str]:
         *([] if pairs else [*_split(cfg), *_model(cfg)]),
         *_schedule(cfg),
         *_control(cfg),
+        *_aids(cfg),
         *_settings(cfg),
         *_hardware(cfg),
     ]
@@ -199,6 +200,29 @@ def _control(cfg: DictConfig) -> Iterator[str]:
         yield f"control.degrees={degrees}: must be above 0 and at most 180"
     elif name != "calibration_off" and degrees:
         yield f"control.degrees={degrees}: control={name} turns no camera; leave it at 0"
+
+
+def _aids(cfg: DictConfig) -> Iterator[str]:
+    augmentation = cfg.augmentation
+    upper = {"brightness": 1, "contrast": 1, "noise": 1, "blur": 8, "mirror": 1, "roll_deg": 180}
+    for key, limit in upper.items():
+        if not 0 <= augmentation[key] <= limit:
+            yield f"augmentation.{key}={augmentation[key]}: must be between 0 and {limit}"
+    if augmentation.roll_deg and not _reads_cameras(cfg.model):
+        yield (
+            f"augmentation.roll_deg={augmentation.roll_deg}: model={cfg.model.name} does not read the cameras that "
+            f"roll; say augmentation.roll_deg=0"
+        )
+    yield from _at_least(0, cfg, "auxiliary.mask", "auxiliary.depth")
+    decay = cfg.averaging.decay
+    if decay is not None and not 0 <= decay < 1:
+        yield f"averaging.decay={decay}: must be at least 0 and below 1, or null"
+
+
+def _reads_cameras(model: DictConfig) -> bool:
+    return model.name not in ("mono", "stereo") or "plane_sweep" in OmegaConf.select(
+        model, "cost_volume.name", default=""
+    )
 
 
 def _settings(cfg: DictConfig) -> Iterator[str]:

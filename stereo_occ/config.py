@@ -11,7 +11,10 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from stereo_occ.auxiliary import AuxiliaryConfig
+from stereo_occ.averaging import AveragingConfig
 from stereo_occ.baselines.config import BASELINE_SCHEMAS
+from stereo_occ.data.augmentation import AugmentationConfig
 from stereo_occ.data.config import DATA_SCHEMAS, DataConfig, SliceConfig
 from stereo_occ.data.controls import ControlConfig
 from stereo_occ.data.placement import PlacementConfig
@@ -153,6 +156,9 @@ class TrainConfig(PairsConfig):
 
     model: Any = MISSING
     control: ControlConfig = field(default_factory=ControlConfig)
+    augmentation: AugmentationConfig = field(default_factory=AugmentationConfig)
+    auxiliary: AuxiliaryConfig = field(default_factory=AuxiliaryConfig)
+    averaging: AveragingConfig = field(default_factory=AveragingConfig)
     queries: QueriesConfig = MISSING
     optimizer: OptimizerConfig = MISSING
     scheduler: SchedulerConfig = MISSING
@@ -262,6 +268,9 @@ def register_schemas() -> None:
         ("scale", ScaleConfig),
         ("paths", PathsConfig),
         ("control", ControlConfig),
+        ("augmentation", AugmentationConfig),
+        ("auxiliary", AuxiliaryConfig),
+        ("averaging", AveragingConfig),
         ("queries", QueriesConfig),
         ("optimizer", OptimizerConfig),
         ("scheduler", SchedulerConfig),

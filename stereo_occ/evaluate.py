@@ -127,9 +127,11 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
 
 
 def load_weights(task: OccupancyTask, state_dict: dict[str, Any], path: str) -> None:
-    """Load the weights of a checkpoint."""
+    """Load the weights of a checkpoint, without heads that only training has."""
     try:
-        task.load_state_dict(state_dict)
+        task.load_state_dict(
+            {name: value for name, value in state_dict.items() if not name.startswith("auxiliary.")}
+        )
     except RuntimeError as error:
         raise UserError(
             f"checkpoint={path}: its weights do not fit its configuration; it was written by another version"

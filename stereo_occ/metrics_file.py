@@ -6,7 +6,7 @@ Keys of every ``metrics.json``:
     seconds: wall-clock since the start.
 
 Of a training besides:
-    parameters: number of trained parameters.
+    parameters: number of trained parameters of the model.
     threshold: decision threshold chosen on the validation objects at the best step.
     best: the entry of ``history`` with the highest ``val/iou``.
     history: one entry per validation with ``step``, ``val/loss`` and the ``val/...`` metrics of the protocol. A value
@@ -25,6 +25,7 @@ from typing import Any
 from lightning.pytorch import Callback, LightningModule, Trainer
 
 from stereo_occ.provenance import environment
+from stereo_occ.task import OccupancyTask
 
 
 class WriteMetrics(Callback):
@@ -42,6 +43,7 @@ class WriteMetrics(Callback):
         self.history = state_dict["history"]
 
     def on_validation_end(self, trainer: Trainer, pl_module: LightningModule) -> None:
+        assert isinstance(pl_module, OccupancyTask)
         if trainer.sanity_checking:
             return
         values = {
@@ -54,7 +56,7 @@ class WriteMetrics(Callback):
             self.path,
             environment()
             | {
-                "parameters": sum(p.numel() for p in pl_module.parameters() if p.requires_grad),
+                "parameters": sum(p.numel() for p in pl_module.model.parameters() if p.requires_grad),
                 "seconds": round(time.monotonic() - self.start, 1),
                 "threshold": best["val/threshold"],
                 "best": best,

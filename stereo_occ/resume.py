@@ -16,7 +16,8 @@ from stereo_occ.errors import UserError
 #: What must not change between the parts of a run. Hardware, logging and the length of the run may.
 FIXED = (
     "data", "rig", "placement", "lights", "material", "texture", "background", "sensor", "categories",
-    "model", "control", "queries", "optimizer", "seed", "points", "batch_size",
+    "model", "control", "augmentation", "auxiliary", "averaging", "queries", "optimizer",
+    "seed", "points", "batch_size",
 )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """The Lightning module around any occupancy model."""
 
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import lightning
@@ -8,11 +9,14 @@ from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
+from stereo_occ.auxiliary import AuxiliaryHeads, auxiliary_losses, outputs_of
+from stereo_occ.averaging import WeightAverage
 from stereo_occ.checkpoint import KEY, VERSION
 from stereo_occ.config import TrainConfig
 from stereo_occ.data.batch import Batch
 from stereo_occ.metrics.scores import Scores
 from stereo_occ.models.base import OccupancyModel
+from stereo_occ.models.encoders import ImageEncoder
 from stereo_occ.optimization import build_optimizer, build_schedule
 
 
@@ -26,9 +30,12 @@ class OccupancyTask(lightning.LightningModule):
     Attributes:
         threshold: decision threshold on the probability, chosen at each validation, kept in checkpoints.
         scores: the views seen by the current or last evaluation.
+        average: of the model's weights, if the training keeps one.
+        auxiliary: heads on the encoder, while a training that asks for them lasts.
     """
 
     threshold: Tensor
+    auxiliary: AuxiliaryHeads | None
 
     def __init__(self, model: OccupancyModel, config: TrainConfig, record: dict[str, Any]) -> None:
         super().__init__()
@@ -37,15 +44,54 @@ class OccupancyTask(lightning.LightningModule):
         self.record = record
         self.scores = Scores()
         self.register_buffer("threshold", torch.tensor(0.5))
+        decay = config.averaging.decay
+        self.average = None if decay is None else WeightAverage(model, decay)
+        self.auxiliary = None
+
+    def configure_model(self) -> None:
+        weights = self.config.auxiliary
+        if self.auxiliary is None and (weights.mask or weights.depth):
+            self.auxiliary = AuxiliaryHeads(self._encoder.channels)
+
+    @property
+    def _encoder(self) -> ImageEncoder:
+        encoder = self.model.encoder
+        assert isinstance(encoder, ImageEncoder)
+        return encoder
 
     def training_step(self, batch: Batch, batch_idx: int) -> Tensor:
         queries = batch.queries["train"]
-        code = self.model.encode(batch.views)
+        watched: AbstractContextManager[list[Tensor]] = nullcontext([])
+        if self.auxiliary is not None:
+            watched = outputs_of(self._encoder)
+        with watched as features:
+            code = self.model.encode(batch.views)
         logits_BN = self.model.decode(code, queries.points_BN3)
         loss = binary_cross_entropy_with_logits(logits_BN, queries.occupied_BN)
         loss = loss + self.model.guidance(code, queries.points_BN3, queries.occupied_BN)
         self.log("train/loss", loss, prog_bar=True, batch_size=len(batch))
+        if self.auxiliary is not None:
+            for name, value in auxiliary_losses(self.auxiliary, features[0], batch).items():
+                self.log(f"train/{name}_loss", value, batch_size=len(batch))
+                loss = loss + getattr(self.config.auxiliary, name) * value
         return loss
+
+    def on_fit_start(self) -> None:
+        if self.average is not None:
+            self.average.to(self.device)
+
+    def optimizer_step(self, *args: Any, **kwargs: Any) -> None:
+        super().optimizer_step(*args, **kwargs)
+        if self.average is not None:
+            self.average.update(self.trainer.global_step)
+
+    def on_validation_start(self) -> None:
+        if self.average is not None:
+            self.average.swap()
+
+    def on_validation_end(self) -> None:
+        if self.average is not None:  # after the callbacks, which draw and save
+            self.average.swap()
 
     def _evaluation_step(self, batch: Batch, stage: str) -> dict[str, Tensor]:
         code = self.model.encode(batch.views)
@@ -82,9 +128,20 @@ class OccupancyTask(lightning.LightningModule):
         self._log_scores("test")
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
-        optimizer = build_optimizer(self.config.optimizer, self.model)
+        optimizer = build_optimizer(self.config.optimizer, self)
         schedule = build_schedule(self.config.scheduler, optimizer, self.config.steps)
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         checkpoint[KEY] = {"version": VERSION, "config": self.record}
+        if self.average is not None:
+            average, weights = self.average.state()
+            checkpoint["state_dict"] |= {f"model.{name}": tensor for name, tensor in average.items()}
+            if "optimizer_states" in checkpoint:  # a state to go on from
+                checkpoint[KEY]["training_weights"] = dict(weights)
+
+    def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        if self.average is not None:
+            state, weights = checkpoint["state_dict"], checkpoint[KEY]["training_weights"]
+            self.average.load({name: state[f"model.{name}"] for name in weights})
+            state |= {f"model.{name}": tensor for name, tensor in weights.items()}

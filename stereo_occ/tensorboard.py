@@ -24,6 +24,9 @@ CURVE_POINTS = 512  # per view
 HPARAM_GROUPS = (
     "model",
     "control",
+    "augmentation",
+    "auxiliary",
+    "averaging",
     "optimizer",
     "scheduler",
     "queries",

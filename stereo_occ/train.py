@@ -10,6 +10,7 @@ from lightning.pytorch.callbacks import Callback, LearningRateMonitor, ModelChec
 from lightning.pytorch.utilities.exceptions import SIGTERMException
 from omegaconf import DictConfig, OmegaConf
 
+from stereo_occ.auxiliary import AuxiliaryConfig
 from stereo_occ.checkpoint import build_task, plain
 from stereo_occ.checks import check_training
 from stereo_occ.cli import entry_point
@@ -64,7 +65,15 @@ def build_data(typed: TrainConfig) -> PairsDataModule:
         workers=typed.trainer.workers,
         progress=typed.progress,
     )
-    data.for_training(typed.queries, typed.points, typed.batch_size, typed.steps, typed.seed)
+    data.for_training(
+        typed.queries,
+        typed.points,
+        typed.batch_size,
+        typed.steps,
+        typed.seed,
+        typed.augmentation,
+        truth=typed.auxiliary != AuxiliaryConfig(),
+    )
     return data
 
 

@@ -21,6 +21,14 @@ class Queries:
 
 
 @dataclass(frozen=True)
+class ImageTruth:
+    """What the images show: share of each pixel that is the object, depth in the rig's unit with 0 for background."""
+
+    mask_B2HW: Tensor
+    depth_B2HW: Tensor
+
+
+@dataclass(frozen=True)
 class ViewId:
     """Which picture of which object."""
 
@@ -35,11 +43,13 @@ class Batch:
 
     Attributes:
         queries: ``train`` for training; ``bbox``, ``cube`` and ``unposed`` for evaluation.
+        truth: of the images, where it was asked for.
     """
 
     views: StereoViews
     queries: Mapping[str, Queries]
     ids: list[ViewId]
+    truth: ImageTruth | None = None
 
     def to(self, device: torch.device | str) -> Self:
         """The same batch on another device."""

@@ -6,6 +6,7 @@ import lightning
 from torch.utils.data import DataLoader
 
 from stereo_occ.config import PairsConfig, QueriesConfig
+from stereo_occ.data.augmentation import AugmentationConfig
 from stereo_occ.data.batch import Batch
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.controls import ControlConfig
@@ -53,15 +54,28 @@ class PairsDataModule(lightning.LightningDataModule):
         self._training: dict[str, Any] = {}
 
     def for_training(
-        self, queries: QueriesConfig, points: int, batch_size: int, steps: int, seed: int
+        self,
+        queries: QueriesConfig,
+        points: int,
+        batch_size: int,
+        steps: int,
+        seed: int,
+        augmentation: AugmentationConfig | None = None,
+        truth: bool = False,
     ) -> None:
-        """Say what training needs; without it only the evaluation loaders work."""
+        """Say what training needs; without it only the evaluation loaders work.
+
+        Args:
+            truth: whether batches have their images' masks and depths.
+        """
         self._training = {
             "queries": queries,
             "points": points,
             "batch_size": batch_size,
             "steps": steps,
             "seed": seed,
+            "augmentation": augmentation,
+            "truth": truth,
         }
 
     def prepare_data(self) -> None:
@@ -92,7 +106,14 @@ class PairsDataModule(lightning.LightningDataModule):
         if not shards:
             raise UserError(f"data.name={self.pairs.data.name}: {NO_OBJECTS.format('train')}")
         dataset = TrainingPairs(
-            shards, views, settings["queries"], settings["points"], settings["seed"], self.control
+            shards,
+            views,
+            settings["queries"],
+            settings["points"],
+            settings["seed"],
+            self.control,
+            settings["augmentation"],
+            settings["truth"],
         )
         first_step = self.trainer.global_step if self.trainer else 0
         batches = ShuffledBatches(

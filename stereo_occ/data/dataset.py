@@ -1,7 +1,7 @@
 """Map-style data sets over shards; items are asked for and returned as whole batches."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from zlib import crc32
 
 import numpy as np
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from torch.utils.data import Dataset, Sampler
 
 from stereo_occ.config import QueriesConfig
-from stereo_occ.data.batch import Batch, Queries, ViewId
+from stereo_occ.data.augmentation import AugmentationConfig, augmented
+from stereo_occ.data.batch import Batch, ImageTruth, Queries, ViewId
 from stereo_occ.data.controls import ControlConfig, controlled
 from stereo_occ.data.shard import Shard
 from stereo_occ.models.base import StereoViews
@@ -21,6 +22,9 @@ from stereo_occ.occupancy.queries import (
     outside_queries,
     surface_queries,
 )
+
+#: Of the random numbers of a batch, after its seed and position; those of its points have none.
+AUGMENTATION_STREAM = 1
 
 
 @dataclass(frozen=True)
@@ -96,9 +100,21 @@ class PairsDataset(Dataset[Batch]):
             ids=[ViewId(shard.category, shard.object_id, view) for shard, view in located],
         )
 
+    def image_truth(self, items: Sequence[int]) -> ImageTruth:
+        """Masks and depths of ``items``."""
+        located = [self.locate(item) for item in items]
+        return ImageTruth(
+            _float(np.stack([shard.mask(view) for shard, view in located])).div_(255),
+            _float(np.stack([shard.depth(view) for shard, view in located])),
+        )
+
 
 class TrainingPairs(PairsDataset):
-    """Pairs with randomly drawn query points under the name ``train``."""
+    """Pairs with randomly drawn query points under the name ``train``, augmented.
+
+    Args:
+        truth: whether batches have their images' masks and depths.
+    """
 
     def __init__(
         self,
@@ -108,16 +124,24 @@ class TrainingPairs(PairsDataset):
         points: int,
         seed: int,
         control: ControlConfig | None = None,
+        augmentation: AugmentationConfig | None = None,
+        truth: bool = False,
     ) -> None:
         super().__init__(shards, views)
         ends = np.rint(np.cumsum([queries.box, queries.outside, queries.surface]) * points).astype(int)
         self.counts = dict(zip(("box", "outside", "surface"), np.diff(ends, prepend=0).tolist(), strict=True))
         self.seed = seed
         self.control = control or ControlConfig()
+        self.augmentation = augmentation or AugmentationConfig()
+        self.truth = truth
 
     def __getitems__(self, draws: list[Draw]) -> Batch:
-        points = [{"train": self._points(draw)} for draw in draws]
-        return controlled(self.control, self.batch([draw.item for draw in draws], points))
+        items = [draw.item for draw in draws]
+        batch = self.batch(items, [{"train": self._points(draw)} for draw in draws])
+        if self.truth:
+            batch = replace(batch, truth=self.image_truth(items))
+        rng = np.random.default_rng([self.seed, draws[0].position, AUGMENTATION_STREAM])
+        return controlled(self.control, augmented(self.augmentation, batch, rng))
 
     def _points(self, draw: Draw) -> LabelledPoints:
         shard, view = self.locate(draw.item)

@@ -8,7 +8,7 @@ import pytest
 import torch
 from lightning.pytorch import Callback
 from lightning.pytorch.utilities.exceptions import SIGTERMException
-from runs import program
+from runs import Workshop, program
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from stereo_occ import train as train_module
@@ -158,6 +158,80 @@ def test_a_stopped_run_goes_on_as_if_it_had_not_been(workshop, run, tmp_path, mo
     logged = curves(folder)
     assert logged["val/iou"] == [6, 12]
     assert logged["train/loss"] == list(range(1, STEPS + 1))
+
+
+#: Every training aid at once, on a small model that reads the cameras.
+AIDS = [
+    "model=pixel_stereo", "model/encoder=light", "model.encoder.channels=8", "model.encoder.widths=[8,8,8,8]",
+    "model.encoder.blocks=[1,1,1,1]", "model.groups=2", "model.code_size=8", "model.hidden=8", "model.blocks=1",
+    "control=right_shuffled", "augmentation=full", "auxiliary=mask_depth", "averaging=ema", "logger=none",
+]  # fmt: skip
+
+
+class Aided(Workshop):
+    """Runs with every training aid."""
+
+    def overrides(self, *more):
+        return [o for o in super().overrides() if not o.startswith("model.")] + AIDS + list(more)
+
+
+@pytest.fixture(scope="module")
+def aided(workshop):
+    return Aided(workshop.root)
+
+
+@pytest.fixture(scope="module")
+def aided_run(aided, tmp_path_factory):
+    return aided.train(tmp_path_factory.mktemp("aided") / "run")
+
+
+@pytest.mark.parametrize("step", [4, 6, 7])
+def test_a_stopped_run_with_training_aids_goes_on(aided, aided_run, tmp_path, monkeypatch, step):
+    folder = stopped(aided, monkeypatch, tmp_path / "run", step)
+    aided.train(folder)
+    for name in ("last.ckpt", "best.ckpt"):
+        assert same_weights(aided_run, folder, name)
+    state, again = (read_checkpoint(run / "last.ckpt")[KEY] for run in (aided_run, folder))
+    assert all(
+        torch.equal(value, again["training_weights"][name])
+        for name, value in state["training_weights"].items()
+    )
+    assert history(aided_run) == history(folder)
+
+
+def test_training_aids_do_not_depend_on_the_process_that_loads(aided, aided_run, tmp_path):
+    assert same_weights(aided_run, aided.train(tmp_path / "run", "trainer.workers=1"))
+
+
+@pytest.mark.parametrize("aid", ["augmentation=none", "auxiliary=none", "averaging=none", "control=none"])
+def test_each_training_aid_makes_another_run(aided, aided_run, tmp_path, aid):
+    without = aided.train(tmp_path / "run", aid)
+    a, b = weights(aided_run), weights(without)
+    assert any(not torch.equal(a[key], b[key]) for key in b if key.startswith("model."))
+    assert (aid == "auxiliary=none") == (a.keys() != b.keys())
+    with pytest.raises(UserError, match=rf"holds a run with another {aid.partition('=')[0]};"):
+        aided.train(without)
+
+
+def test_checkpoints_hold_the_average_and_beside_it_the_weights_to_go_on_from(aided, aided_run, tmp_path):
+    checkpoint = read_checkpoint(aided_run / "last.ckpt")
+    training, average = checkpoint[KEY]["training_weights"], checkpoint["state_dict"]
+    moved = [name for name, value in training.items() if not torch.equal(value, average[f"model.{name}"])]
+    assert any("running_mean" in name for name in moved)
+    assert any("decoder" in name for name in moved)
+    kept = aided.train(tmp_path / "run", "validation.keep_all=true")
+    alone = torch.load(kept / "step_000012.ckpt", weights_only=True)
+    assert "training_weights" not in alone[KEY]
+    assert all(torch.equal(value, average[name]) for name, value in alone["state_dict"].items())
+
+
+def test_what_is_evaluated_is_the_average_that_was_validated(aided, aided_run, tmp_path):
+    best = json.loads((aided_run / "metrics.json").read_text())["best"]
+    measured = aided.evaluate(aided_run / "best.ckpt", tmp_path, "subset=val", "examples=0", "meshes=0")
+    assert measured["test/iou"] == pytest.approx(best["val/iou"], abs=1e-6)
+    assert measured["test/threshold"] == pytest.approx(best["val/threshold"])
+    results = json.loads((tmp_path / "metrics.json").read_text())
+    assert results["parameters"] == json.loads((aided_run / "metrics.json").read_text())["parameters"]
 
 
 def test_a_run_stopped_by_hand_and_by_the_machine(workshop, run, tmp_path, monkeypatch, capsys):
