@@ -1,4 +1,4 @@
-"""Every command in the README and on the page about clusters is one that works."""
+"""Every command in the README and on the pages about clusters and metrics is one that works."""
 
 import re
 import shlex
@@ -21,6 +21,9 @@ CHECKS = {
 
 WITHOUT_ARGUMENTS = {"doctor"}
 
+#: Programs of two folders, without a configuration.
+OF_FOLDERS = {"compare"}
+
 
 def code_lines(text):
     """The lines of the code blocks, continuations joined."""
@@ -29,7 +32,7 @@ def code_lines(text):
 
 
 def commands():
-    pages = [CHECKOUT / "README.md", CHECKOUT / "docs" / "cluster.md"]
+    pages = [CHECKOUT / "README.md", *(CHECKOUT / "docs" / f"{name}.md" for name in ("cluster", "metrics"))]
     lines = [line for page in pages for line in code_lines(page.read_text())]
     return [line for line in lines if "python -m stereo_occ" in line]
 
@@ -56,6 +59,10 @@ def test_a_command_of_the_readme_composes_without_problems(command, tmp_path, mo
     assert package == "stereo_occ"
     if program in WITHOUT_ARGUMENTS:
         assert words[3:] == []
+        return
+    if program in OF_FOLDERS:
+        assert [word for word in words[3:] if word.startswith("-")] == []
+        assert len(words[3:]) == 2
         return
     assert program in CHECKS, f"no test knows {words[2]}"
     (tmp_path / "x.ckpt").touch()

@@ -13,9 +13,11 @@ from PIL import Image
 from runs import program
 from samples import single_line
 
+from stereo_occ import compare
 from stereo_occ.checkpoint import KEY, read_checkpoint
 from stereo_occ.cli import compose_config
 from stereo_occ.errors import UserError
+from stereo_occ.evaluate import evaluate
 from stereo_occ.train import train
 
 
@@ -199,8 +201,78 @@ def test_the_command(workshop, run, tmp_path):
         f"paths.data={workshop.root / 'data'}",
         "hydra.run.dir=out",
     ]
-    settings = ["views=2", "points=500", "examples=0", "progress=false"]
+    settings = ["views=2", "points=500", "meshes=0", "examples=0", "progress=false"]
     done = program("-m", "stereo_occ.evaluate", *arguments, *settings, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "test/iou " in done.stdout + done.stderr
     assert (tmp_path / "out" / "metrics.json").is_file()
+
+
+@pytest.mark.parametrize("baseline", ["visual_hull", "sgm", "mean_shape", "nearest_shape"])
+def test_a_baseline_is_measured_like_a_network(workshop, run, tmp_path, evaluation, baseline):
+    """On the same object-views, with every metric, and comparable with it."""
+    if baseline == "sgm":
+        pytest.importorskip("cv2")
+    small = ["meshes=1", "surface_points=500", "mesh_resolution=32", "examples=0"]
+    overrides = [f"baseline={baseline}", "subset=val", *small]
+    metrics = workshop.evaluate(run / "best.ckpt", tmp_path / "baseline", *overrides)
+    workshop.evaluate(run / "best.ckpt", tmp_path / "network", "subset=val", *small)
+    tables = [rows(tmp_path / name / "per_object.csv") for name in ("baseline", "network")]
+    assert [list(row) for row in tables[0]] == [list(row) for row in tables[1]]
+    keys = [[(row["category"], row["object_id"], row["view"]) for row in table] for table in tables]
+    assert keys[0] == keys[1]
+    assert [row["mesh_iou"] != "" for row in tables[0]] == [True, False] * 3
+    assert set(metrics) >= {"test/iou/mug", "test/mesh_iou", "test/chamfer_l1", "test/cavity_empty/bowl"}
+    compare.main(
+        [*(str(tmp_path / name) for name in ("network", "baseline")), "--output", str(tmp_path / "out")]
+    )
+    compared = json.loads((tmp_path / "out" / "comparison.json").read_text())
+    assert compared["notes"] == []
+    assert compared["results"]["iou"]["macro"]["b"] == pytest.approx(metrics["test/iou"])
+
+
+def test_the_nearest_training_shape_of_a_training_object_is_itself(workshop, run, tmp_path):
+    metrics = workshop.evaluate(
+        run / "best.ckpt", tmp_path, "baseline=nearest_shape", "subset=train",
+        "meshes=1", "surface_points=2000", "examples=0",
+    )  # fmt: skip
+    for name in ("iou", "iou_bbox", "mesh_iou", "f_score_2", "cavity_empty"):
+        assert metrics[f"test/{name}"] == pytest.approx(1, abs=2e-3), name
+    assert metrics["test/iou_unrotated"] < 0.9
+
+
+def test_a_baseline_needs_no_checkpoint(workshop, tmp_path):
+    """The training data may be named by overrides of train instead."""
+    data = [o for o in workshop.overrides() if o.startswith(("data.", "scale.", "workers"))]
+    cfg = compose_config(
+        "evaluate",
+        [
+            "baseline=visual_hull", f"training={data}", f"paths.data={workshop.root / 'data'}",
+            "progress=false", "workers=1", "views=2", "points=500", "meshes=0", "examples=0",
+        ],
+    )  # fmt: skip
+    metrics = evaluate(cfg, tmp_path)
+    results = json.loads((tmp_path / "metrics.json").read_text())
+    assert results["predictor"] == {"baseline": {"name": "visual_hull"}}
+    assert (results["objects"], results["parameters"]) == (3, None)
+    assert 0 < metrics["test/iou"] < 1
+
+
+def test_an_empty_prediction_is_counted(workshop, run, tmp_path):
+    """A threshold that nothing reaches: no mesh, IoU 0, the worst distance, and the number of failures."""
+    checkpoint = read_checkpoint(run / "best.ckpt")
+    checkpoint["state_dict"]["threshold"] = torch.tensor(1 - 1e-6)
+    torch.save(checkpoint, tmp_path / "best.ckpt")
+    metrics = workshop.evaluate(
+        tmp_path / "best.ckpt", tmp_path / "out", "meshes=1", "surface_points=500", "examples=0"
+    )
+    results = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert results["failures"] == {"empty mesh": 3}
+    assert metrics["test/chamfer_l1"] == pytest.approx(3**0.5)
+    assert (metrics["test/iou"], metrics["test/mesh_iou"], metrics["test/f_score_1"]) == (0, 0, 0)
+    assert {row["failure"] for row in rows(tmp_path / "out" / "per_object.csv")} == {"", "empty mesh"}
+
+
+def test_the_same_command_gives_the_same_numbers(workshop, run, tmp_path, evaluation):
+    again = workshop.evaluate(run / "best.ckpt", tmp_path, "subset=val")
+    assert again == evaluation[1]
