@@ -234,7 +234,7 @@ def test_a_baseline_is_measured_like_a_network(workshop, run, tmp_path, evaluati
 def test_the_nearest_training_shape_of_a_training_object_is_itself(workshop, run, tmp_path):
     metrics = workshop.evaluate(
         run / "best.ckpt", tmp_path, "baseline=nearest_shape", "subset=train",
-        "meshes=1", "surface_points=2000", "examples=0",
+        "meshes=1", "surface_points=30000", "examples=0",
     )  # fmt: skip
     for name in ("iou", "iou_bbox", "mesh_iou", "f_score_2", "cavity_empty"):
         assert metrics[f"test/{name}"] == pytest.approx(1, abs=2e-3), name

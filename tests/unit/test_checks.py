@@ -163,6 +163,8 @@ def test_rendering_needs_no_division_into_subsets():
         ("points=0", "points=0: must be at least 1"),
         ("mesh_resolution=0", "mesh_resolution=0: must be at least 1"),
         ("examples=-1", "examples=-1: must be at least 0"),
+        ("meshes=-1", "meshes=-1: must be at least 0"),
+        ("training=['scale=smoke']", "training=['scale=smoke']: the checkpoint says what it was trained on"),
         ("control=calibration_off_1 control.degrees=-1", "control.degrees=-1.0: must be above 0"),
         ("checkpoint=nowhere.ckpt", "checkpoint=nowhere.ckpt: no such file; give the path of a .ckpt"),
     ],
@@ -185,3 +187,14 @@ def test_an_evaluation_takes_sizes_from_its_checkpoint(tmp_path):
         "placement=free",
     ]
     assert find_problems("evaluate", overrides, check_evaluation) == []
+
+
+def test_a_problem_of_a_baseline():
+    for overrides, expected in (
+        (["baseline=sgm", "baseline.block=4"], "baseline.block=4: must be odd"),
+        (["baseline=mean_shape", "baseline.cells=0"], "baseline.cells=0: must be at least 1"),
+        (["baseline=visual_hull", "control=left_twice"], "control=left_twice: changes what a network sees"),
+    ):
+        (problem,) = find_problems("evaluate", overrides, check_evaluation)
+        assert problem.startswith(expected)
+    assert find_problems("evaluate", ["baseline=nearest_shape"], check_evaluation) == []
