@@ -45,6 +45,9 @@ FORMAT = "stereo_occ.shard"
 VERSION = 1
 POOLS = ("box", "surface")
 
+#: Of more views than this the cameras and poses are read one by one: those of a thousand take a tenth of a second.
+ROWS_AT_ONCE = 128
+
 
 @dataclass(frozen=True, eq=False)
 class Views:
@@ -180,10 +183,12 @@ class Shard:
         return {}
 
     def _row(self, name: str, view: int) -> NDArray[np.float64]:
-        """One row of a small data set, read once: all of a thousand take a tenth of a second."""
+        """One row of a small data set, read once: all at a time, or of very many each when it is asked for."""
         if name not in self._rows:
             dataset = self._dataset(name)
-            self._rows[name] = np.empty(dataset.shape), np.zeros(len(dataset), bool)
+            few = len(dataset) <= ROWS_AT_ONCE
+            rows = self._read(name) if few else np.empty(dataset.shape)
+            self._rows[name] = rows, np.full(len(dataset), few)
         rows, known = self._rows[name]
         if not known[view]:
             rows[view] = self._read(name, view)

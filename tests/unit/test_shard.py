@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from samples import pools_of, small_shard, solid, views_of
 
+from stereo_occ.data import shard as shard_module
 from stereo_occ.data.shard import VERSION, Shard, checksum_path
 from stereo_occ.data.shard_writing import partial_path, remove_partial, write_shard
 from stereo_occ.errors import UserError
@@ -32,7 +33,9 @@ def contents(path):
     return texts, [np.ascontiguousarray(array).tobytes() for array in arrays]
 
 
-def test_everything_comes_back(tmp_path):
+@pytest.mark.parametrize("rows_at_once", [0, 128])
+def test_everything_comes_back(tmp_path, monkeypatch, rows_at_once):
+    monkeypatch.setattr(shard_module, "ROWS_AT_ONCE", rows_at_once)
     shape, views = solid("mug", "cup"), views_of(3)
     pools = pools_of(shape)
     path = tmp_path / "mug" / "cup.h5"
