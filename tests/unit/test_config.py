@@ -19,7 +19,8 @@ from stereo_occ.shapes.procedural import PAPER_COUNTS
 
 PROGRAMS = ("train", "render", "evaluate")
 FILES = sorted(path.relative_to(conf_dir()).with_suffix("") for path in conf_dir().rglob("*.yaml"))
-CHOICES = [(str(file.parent), file.name) for file in FILES if file.parent != Path()]
+OURS = [file for file in FILES if file.parts[0] != "hydra"]  # presets of Hydra's own groups have its schemas
+CHOICES = [(str(file.parent), file.name) for file in OURS if file.parent != Path()]
 MODELS = [option for group, option in CHOICES if group == "model"]
 SCALES = [option for group, option in CHOICES if group == "scale"]
 
@@ -73,14 +74,18 @@ def test_every_group_of_conf_belongs_to_a_program():
 
 def rows(program):
     """Command lines that together name every choice of a program, one of each group at a time."""
-    options = {group: [option for g, option in CHOICES if g == group] for group in sorted(groups_of(program))}
+    groups = sorted(groups_of(program) - {"baseline"})
+    options = {group: [option for g, option in CHOICES if g == group] for group in groups}
     return [
         [f"{group}={choices[row]}" for group, choices in options.items() if row < len(choices)]
         for row in range(max(map(len, options.values())))
     ]
 
 
-@pytest.mark.parametrize(("program", "choices"), [(p, row) for p in PROGRAMS for row in rows(p)])
+BASELINES = [("evaluate", [f"baseline={option}"]) for group, option in CHOICES if group == "baseline"]
+
+
+@pytest.mark.parametrize(("program", "choices"), [(p, row) for p in PROGRAMS for row in rows(p)] + BASELINES)
 def test_every_choice_of_every_program(needed, program, choices):
     more = [override for choice in choices for override in needed.get(choice, [])]
     assert problems(program, [*choices, *more, *needed.get(program, [])]) == []
@@ -113,7 +118,7 @@ def test_validation_schedules_end_with_the_last_step(scale, schedule):
 
 
 @pytest.mark.parametrize(
-    "file", [f for f in FILES if f.parent.parts[:1] not in {(), ("experiment",), ("debug",)}]
+    "file", [f for f in OURS if f.parent.parts[:1] not in {(), ("experiment",), ("debug",)}]
 )
 def test_every_group_file_is_checked_against_its_schema(file):
     assert defaults_of(file)[0].startswith("base_")
