@@ -15,7 +15,9 @@ UP = np.array([0.0, 1.0, 0.0])
 @cache
 def box() -> Solid:
     """Half a metre either side of the Y axis."""
-    positions, normals, faces = [], [], []
+    positions: list[NDArray[np.float64]] = []
+    normals: list[NDArray[np.float64]] = []
+    faces: list[list[int]] = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
             normal_3 = np.roll([sign, 0.0, 0.0], axis)
