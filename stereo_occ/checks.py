@@ -72,10 +72,6 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
     if cfg.baseline is not None:
         baseline: Any = OmegaConf.to_object(cfg.baseline)
         problems += baseline_problems(baseline)
-        if cfg.control is not None:
-            problems.append(
-                f"control={cfg.control.name}: changes what a network sees; leave it out with a baseline"
-            )
     if cfg.data is not None and "root" in cfg.data:
         problems += _folder(cfg)
     return problems

@@ -3,7 +3,7 @@
 ``metrics.json`` has the keys of :mod:`stereo_occ.metrics_file` and:
     predictor: ``checkpoint`` or ``baseline`` with its settings.
     step, parameters: of the network; null for a baseline.
-    control: what the network was shown, see :mod:`stereo_occ.data.controls`.
+    control: what the network was shown, see :mod:`stereo_occ.data.controls`; null for a baseline, which has no twin.
     config: the settings of the evaluation.
     subset, data, objects, views, points: what was measured, and the folder of its shards.
     split: ``hash`` of the names of training and evaluated objects, see :func:`~stereo_occ.provenance.split_hash`.
@@ -113,7 +113,7 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
             "points": settings.points,
             "split": split_facts(cfg, settings, trained, data),
             "threshold": predictor.threshold,
-            "control": plain(trained.control),
+            "control": plain(trained.control) if settings.baseline is None else None,
             "skipped": len(skipped),
             "failures": dict(Counter(row["failure"] for row in result.rows if row["failure"])),
             "meshes": vars(meshes),
