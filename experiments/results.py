@@ -11,38 +11,40 @@ from PIL import Image
 HERE = Path(__file__).parent
 README = HERE.parent / "README.md"
 BEGIN, END = "<!-- results:begin -->", "<!-- results:end -->"
+SHORT, RECIPE = HERE / "laptop_4k", HERE / "recipe_10k"
 RUNS = {
-    "stereo": "python -m stereo_occ.train model=stereo steps=4000",
-    "mono": "python -m stereo_occ.train model=mono model.encoder.weights=null steps=4000",
+    SHORT / "mono": "model=mono model.encoder.weights=null steps=4000",
+    SHORT / "stereo": "model=stereo steps=4000",
+    RECIPE / "plane_sweep_stereo": "experiment=recipe model=plane_sweep_stereo steps=10000",
 }
 METRICS = {"iou": "-", "iou_bbox": "--", "iou_unrotated": ":"}
 FIGURE_CATEGORIES = ("mug", "bowl", "bottle")
 
 
-def table(folder: Path) -> str:
-    """IoU of each run's best state as a Markdown table, with the command of each row."""
+def table() -> str:
+    """IoU of each run's best state as a Markdown table, with the settings of each row."""
     lines = [
-        "| model | parameters | test `iou` (mug / bowl / bottle) | `iou_bbox` | `iou_unrotated` | real objects `iou` |",
+        "| `python -m stereo_occ.train` | parameters | test `iou` (mug / bowl / bottle) | `iou_bbox` | `iou_unrotated` | real objects, `iou` |",
         "|---|---|---|---|---|---|",
     ]
-    for name, command in RUNS.items():
-        test, real = (json.loads((folder / name / f"{where}.json").read_text()) for where in ("test", "real"))
+    for folder, settings in RUNS.items():
+        test, real = (json.loads((folder / f"{where}.json").read_text()) for where in ("test", "real"))
         metrics = test["metrics"]
         parts = " / ".join(f"{metrics[f'test/iou/{category}']:.2f}" for category in FIGURE_CATEGORIES)
         lines.append(
-            f"| `{command}` | {test['parameters'] / 1e6:.1f} M | **{metrics['test/iou']:.3f}** ({parts}) | "
+            f"| `{settings}` | {test['parameters'] / 1e6:.1f} M | **{metrics['test/iou']:.3f}** ({parts}) | "
             f"{metrics['test/iou_bbox']:.3f} | {metrics['test/iou_unrotated']:.3f} | "
-            f"{real['metrics']['test/iou']:.3f} |"
+            f"{real['metrics']['test/iou']:.3f} ({real['objects']}) |"
         )
     return "\n".join(lines)
 
 
-def curves(folder: Path) -> None:
-    """The three metrics along training, on test and on real objects."""
+def curves() -> None:
+    """The three metrics along training of the paper's two models, on test and on real objects."""
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True, layout="constrained")
     for axis, where in zip(axes, ("test", "real"), strict=True):
-        for color, name in enumerate(RUNS):
-            curve: list[dict[str, Any]] = json.loads((folder / name / "curve.json").read_text())
+        for color, name in enumerate(("stereo", "mono")):
+            curve: list[dict[str, Any]] = json.loads((SHORT / name / "curve.json").read_text())
             for metric, style in METRICS.items():
                 values = [entry[where][f"test/{metric}"] for entry in curve]
                 steps = [entry["step"] for entry in curve]
@@ -51,25 +53,24 @@ def curves(folder: Path) -> None:
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("macro IoU")
     axes[1].legend(fontsize=7)
-    figure.savefig(folder / "curves.png", dpi=110)
+    figure.savefig(SHORT / "curves.png", dpi=110)
 
 
-def examples(folder: Path, name: str) -> None:
+def examples(folder: Path) -> None:
     """The first test object of each category: left | right | predicted | true."""
     rows = []
     for category in FIGURE_CATEGORIES:
-        first = sorted((folder / name / "pictures" / category).glob("*.png"))[0]
+        first = sorted((folder / "pictures" / category).glob("*.png"))[0]
         rows.append(np.asarray(Image.open(first)))
     Image.fromarray(np.concatenate(rows)).save(folder / "figure.png", optimize=True)
 
 
 def main() -> None:
-    folder = HERE / "laptop_4k"
-    curves(folder)
-    examples(folder, "stereo")
+    curves()
+    examples(RECIPE / "plane_sweep_stereo")
     text = README.read_text()
     before, after = text.split(BEGIN)[0], text.split(END)[1]
-    README.write_text(f"{before}{BEGIN}\n{table(folder)}\n{END}{after}")
+    README.write_text(f"{before}{BEGIN}\n{table()}\n{END}{after}")
 
 
 if __name__ == "__main__":

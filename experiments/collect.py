@@ -21,8 +21,9 @@ def main(run: Path, destination: Path) -> None:
             measured = json.loads(path.read_text())
             curve.setdefault(measured["step"], {})[where] = measured["metrics"]
     shutil.copytree(run / "test_best" / "pictures", destination / "pictures", dirs_exist_ok=True)
-    steps = [{"step": step, **curve[step]} for step in sorted(curve)]
-    (destination / "curve.json").write_text(json.dumps(steps, indent=1) + "\n")
+    if curve:
+        steps = [{"step": step, **curve[step]} for step in sorted(curve)]
+        (destination / "curve.json").write_text(json.dumps(steps, indent=1) + "\n")
 
 
 if __name__ == "__main__":
