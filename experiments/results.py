@@ -24,7 +24,8 @@ FIGURE_CATEGORIES = ("mug", "bowl", "bottle")
 def table() -> str:
     """IoU of each run's best state as a Markdown table, with the settings of each row."""
     lines = [
-        "| `python -m stereo_occ.train` | parameters | test `iou` (mug / bowl / bottle) | `iou_bbox` | `iou_unrotated` | real objects, `iou` |",
+        "| `python -m stereo_occ.train` | parameters | test `iou` (mug / bowl / bottle) | `iou_bbox` "
+        "| `iou_unrotated` | real objects, `iou` |",
         "|---|---|---|---|---|---|",
     ]
     for folder, settings in RUNS.items():
