@@ -30,8 +30,8 @@ demo: $(READY) ## render a small data set, train, evaluate, write meshes and pic
 	@echo "metrics:                                    $(DEMO)/evaluation/metrics.json"
 	@echo "curves:                                     make tensorboard"
 
-test: $(READY) ## run the tests
-	$(RUN)/python -m pytest
+test: $(READY) ## run the tests, a process per core
+	OMP_NUM_THREADS=1 $(RUN)/python -m pytest -n auto --dist loadfile
 
 lint: $(READY) ## ruff: rules and format
 	$(RUN)/ruff check .

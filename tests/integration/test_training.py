@@ -112,8 +112,8 @@ def test_the_run_folder(run):
 def test_metrics_file(run):
     metrics = json.loads((run / "metrics.json").read_text())
     assert metrics.keys() == {
-        "schema", "stereo_occ", "torch", "python", "cpu", "threads", "parameters", "seconds", "threshold", "best",
-        "history",
+        "schema", "protocol", "stereo_occ", "commit", "dirty", "torch", "python", "packages", "cpu", "threads",
+        "parameters", "seconds", "threshold", "best", "history",
     }  # fmt: skip
     best = max(metrics["history"], key=lambda entry: entry["val/iou"])
     assert metrics["best"] == best

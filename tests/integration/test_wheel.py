@@ -29,12 +29,11 @@ def site(tmp_path_factory):
 
 def test_the_wheel_holds_the_whole_package_and_its_configuration(site):
     def files(root, folder):
-        return {
-            path.relative_to(root / folder) for path in (root / folder).rglob("*") if path.suffix != ".pyc"
-        }
+        found = (path for path in (root / folder).rglob("*") if path.is_file() and path.suffix != ".pyc")
+        return {path.relative_to(root / folder) for path in found}
 
-    package = {p for p in files(CHECKOUT, "stereo_occ") if p.name != "__pycache__"}
-    installed = {p for p in files(site, "stereo_occ") if p.name != "__pycache__" and p.parts[0] != "conf"}
+    package = files(CHECKOUT, "stereo_occ")
+    installed = {path for path in files(site, "stereo_occ") if path.parts[0] != "conf"}
     assert installed == package
     assert files(site, "stereo_occ/conf") == files(CHECKOUT, "conf")
     assert (site / "stereo_occ" / "py.typed").exists()
