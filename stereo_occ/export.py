@@ -47,7 +47,9 @@ def export(cfg: DictConfig) -> list[Path]:
     }
     # OUTPUT may hold dots: v1.2 is no suffix.
     weights, card = (prefix.with_name(prefix.name + suffix) for suffix in (SUFFIX, ".md"))
-    write_weights(weights, description, checkpoint["state_dict"], settings.half)
+    state = checkpoint["state_dict"]
+    state = {name: state[name] for name in state if name == "threshold" or name.startswith("model.")}
+    write_weights(weights, description, state, settings.half)
     parameters = sum(parameter.numel() for parameter in trained.model.parameters())
     text = model_card(prefix.name, description, parameters, weights.stat().st_size, training_command(run))
     write_whole(card, text.encode())

@@ -1,6 +1,7 @@
 """Finished meshes: fewer faces where the surface is flat, and files."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,8 @@ def simplified(mesh: Trimesh, tolerance: float) -> Trimesh:
     Edges are collapsed by manifold3d, which keeps a closed surface closed. A mesh that it does not take is returned
     as it is.
     """
-    solid = Manifold(Mesh64(np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.uint64)))
+    # Copies: manifold3d takes no arrays that are read-only.
+    solid = Manifold(Mesh64(np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.uint64)))
     if solid.status() != Error.NoError or solid.is_empty():
         return mesh
     simple = solid.simplify(tolerance).to_mesh64()
@@ -58,5 +60,6 @@ def write_whole(path: Path, data: bytes) -> None:
         partial.write_bytes(data)
         partial.replace(path)
     except OSError as error:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
         raise UserError(f"output={path}: cannot be written ({error.strerror or error})") from error

@@ -99,6 +99,8 @@ class SampledField:
         lower_V3, upper_V3 = np.floor(vertices_V3).astype(np.intp), np.ceil(vertices_V3).astype(np.intp)
         on_edge_V = ((upper_V3 - lower_V3).sum(axis=1) == 1) & (lower_V3 >= 0).all(axis=1)
         on_edge_V &= (upper_V3 <= self.cells).all(axis=1)
+        if not on_edge_V.any():
+            return vertices_V3
         a_N3, b_N3 = lower_V3[on_edge_V].astype(np.float64), upper_V3[on_edge_V].astype(np.float64)
         f_a_N, f_b_N = (
             self.values_CCC[tuple(ends_V3[on_edge_V].T)].astype(np.float64) - self.level

@@ -220,11 +220,14 @@ class Reconstructor:
         mesh = Trimesh(transform_points(np.asarray(mesh.vertices), left_from_cube), mesh.faces, process=False)
         images = photos[0].rgb_HW3, photos[1].rgb_HW3
         with _timed(seconds, "finish"):
-            if surface.simplify:
-                mesh = simplified(mesh, surface.simplify)
+            # Slivers that marching cubes leaves would become holes when a file's single precision merges their corners.
+            sliver = 1e-3 * framing.unit / surface.resolution
+            mesh = simplified(mesh, max(surface.simplify or 0, sliver))
             if surface.color:
                 clearance = framing.unit / surface.resolution
-                mesh.visual = ColorVisuals(mesh, vertex_colors=vertex_colors(mesh, pair, images, clearance))
+                masks_2 = [None, None] if found is None else [part.mask_HW for part in found]
+                colors_V3 = vertex_colors(mesh, pair, images, masks_2, clearance)
+                mesh.visual = ColorVisuals(mesh, vertex_colors=colors_V3)
         return Reconstruction(
             mesh,
             left_from_cube,

@@ -1,8 +1,10 @@
 """Colours of a surface from the photographs in which it is seen."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import binary_erosion, map_coordinates
 from scipy.spatial import cKDTree
 from trimesh import Trimesh
 
@@ -10,7 +12,11 @@ from stereo_occ.calibration import RealCamera, RealPair
 
 
 def vertex_colors(
-    mesh: Trimesh, pair: RealPair, images: tuple[NDArray[np.uint8], NDArray[np.uint8]], clearance: float
+    mesh: Trimesh,
+    pair: RealPair,
+    images: tuple[NDArray[np.uint8], NDArray[np.uint8]],
+    masks: Sequence[NDArray[np.bool_] | None],
+    clearance: float,
 ) -> NDArray[np.uint8]:
     """Display colours ``(V, 3)``: the mean of both photographs, by how squarely each sees the vertex.
 
@@ -19,12 +25,14 @@ def vertex_colors(
     Args:
         mesh: left camera's frame, metres.
         pair: fitted to ``images``.
+        masks: of the object, where they are known; what lies at their edge or outside is not the object's colour.
         clearance: metres above the surface from which it is asked whether the camera is in sight.
     """
     weight_2V = np.zeros((2, len(mesh.vertices)))
     color_2V3 = np.zeros((2, len(mesh.vertices), 3))
-    for index, (camera, image_HW3) in enumerate(zip(pair.cameras, images, strict=True)):
-        weight_2V[index], color_2V3[index] = _seen(mesh, camera, image_HW3, clearance)
+    for index, (camera, image_HW3, mask_HW) in enumerate(zip(pair.cameras, images, masks, strict=True)):
+        within_HW = np.ones(image_HW3.shape[:2], bool) if mask_HW is None else binary_erosion(mask_HW)
+        weight_2V[index], color_2V3[index] = _seen(mesh, camera, image_HW3, within_HW, clearance)
     total_V = weight_2V.sum(axis=0)
     seen_V = total_V > 0
     if not seen_V.any():
@@ -37,7 +45,11 @@ def vertex_colors(
 
 
 def _seen(
-    mesh: Trimesh, camera: RealCamera, image_HW3: NDArray[np.uint8], clearance: float
+    mesh: Trimesh,
+    camera: RealCamera,
+    image_HW3: NDArray[np.uint8],
+    within_HW: NDArray[np.bool_],
+    clearance: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """How squarely each vertex is seen, 0 where it is not, and the colour there."""
     height, width = image_HW3.shape[:2]
@@ -46,6 +58,7 @@ def _seen(
     square_V = np.einsum("vi,vi->v", towards_V3, mesh.vertex_normals)
     pixels_V2 = camera.pixels(np.asarray(mesh.vertices))
     inside_V = ((pixels_V2 >= 0) & (pixels_V2 <= [width - 1, height - 1])).all(axis=1)
+    inside_V[inside_V] = within_HW[tuple(np.rint(pixels_V2[inside_V]).astype(np.intp).T[::-1])]
     facing = np.flatnonzero((square_V > 0.05) & inside_V)
     origins_N3 = mesh.vertices[facing] + clearance * mesh.vertex_normals[facing]
     hidden_N = mesh.ray.intersects_any(origins_N3, towards_V3[facing])

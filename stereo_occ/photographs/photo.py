@@ -106,7 +106,7 @@ def seen_by(
     grid_N2 = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
     source_N2 = camera.pixels_along(_rays(target, grid_N2) @ _turn(camera, target).T)
     source_N2 = (source_N2 + 0.5) / factor - 0.5
-    mode, fill = ("nearest", 0.0) if outside is None else ("constant", outside)
+    mode, fill = ("nearest", 0.0) if outside is None else ("grid-constant", outside)
     channels = []
     for channel in np.moveaxis(image_HWC, 2, 0):
         reduced = Image.fromarray(channel).reduce(factor) if factor > 1 else channel

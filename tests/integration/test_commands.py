@@ -1,4 +1,4 @@
-"""Every command in the README and on the pages about clusters and metrics is one that works."""
+"""Every command in the README and on the pages about clusters, metrics and own cameras is one that works."""
 
 import re
 import shlex
@@ -9,7 +9,9 @@ import torch
 
 import stereo_occ
 from stereo_occ.checks import check_evaluation, check_pairs, check_rendering, check_training
+from stereo_occ.export import check_export
 from stereo_occ.problems import find_problems
+from stereo_occ.reconstruct import check_reconstruction
 
 CHECKOUT = Path(stereo_occ.__file__).parents[1]
 CHECKS = {
@@ -17,9 +19,18 @@ CHECKS = {
     "evaluate": check_evaluation,
     "render": check_rendering,
     "inspect": check_pairs,
+    "reconstruct": check_reconstruction,
+    "export": check_export,
 }
 
 WITHOUT_ARGUMENTS = {"doctor"}
+
+#: What stands for the reader's own pair.
+EXAMPLE_PAIR = {
+    "left": ("left", CHECKOUT / "examples" / "left.png"),
+    "right": ("right", CHECKOUT / "examples" / "right.png"),
+    "rig": ("calibration", CHECKOUT / "examples" / "calibration.yaml"),
+}
 
 #: Programs of two folders, without a configuration.
 OF_FOLDERS = {"compare"}
@@ -32,7 +43,8 @@ def code_lines(text):
 
 
 def commands():
-    pages = [CHECKOUT / "README.md", *(CHECKOUT / "docs" / f"{name}.md" for name in ("cluster", "metrics"))]
+    docs = (CHECKOUT / "docs" / f"{name}.md" for name in ("cluster", "metrics", "own-camera"))
+    pages = [CHECKOUT / "README.md", *docs]
     lines = [line for page in pages for line in code_lines(page.read_text())]
     return [line for line in lines if "python -m stereo_occ" in line]
 
@@ -70,6 +82,8 @@ def test_a_command_of_the_readme_composes_without_problems(command, tmp_path, mo
     for word in words[3:]:
         key = word.partition("=")[0]
         stand_in = {"checkpoint": tmp_path / "x.ckpt", "data.root": tmp_path}.get(key)
+        if program == "reconstruct" and key in EXAMPLE_PAIR:
+            key, stand_in = EXAMPLE_PAIR[key]
         overrides.append(f"{key}={stand_in}" if stand_in else word)
     flags = [word for word in overrides if word.startswith("-")]
     assert set(flags) <= {"-m", "--multirun"}

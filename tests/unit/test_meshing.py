@@ -125,6 +125,37 @@ def test_batches_bound_the_points_asked_at_once():
     np.testing.assert_array_equal(small.vertices, extract_mesh(torus, LOW, HIGH, 64).vertices)
 
 
+def squashed(points_N3):
+    """A torus whose logits are far from linear about its surface."""
+    inside_N = torus(points_N3)
+    return np.where(inside_N > 0, 3.0, 0.3) * np.sign(inside_N) * np.log1p(200 * np.abs(inside_N))
+
+
+def test_steps_find_the_surface_where_logits_are_not_linear():
+    errors, volumes = [], []
+    for steps in (0, 1, 2, 5):
+        mesh = extract_mesh(squashed, LOW, HIGH, 32, steps=steps)
+        errors.append(np.abs(torus(mesh.vertices)).max())
+        volumes.append(mesh.volume)
+        assert mesh.is_volume
+    assert errors[0] > errors[1] > errors[2] > errors[3]
+    assert errors[3] < 0.2 * errors[0]
+    assert volumes[3] == pytest.approx(2 * np.pi**2 * 0.3 * 0.1**2, rel=0.01)
+
+
+def test_steps_keep_faces_vertices_on_their_edges_and_the_closing_layer():
+    ends = extract_mesh(ball(0.4, (0.5, 0.5, 0.5)), LOW, HIGH, 32)
+    found = extract_mesh(ball(0.4, (0.5, 0.5, 0.5)), LOW, HIGH, 32, steps=3)
+    np.testing.assert_array_equal(found.faces, ends.faces)
+    assert np.abs(found.vertices - ends.vertices).max() < 1 / 32
+    assert found.bounds[1] == pytest.approx(0.5, abs=1e-5)
+
+
+def test_steps_of_a_full_box_change_nothing():
+    full = extract_mesh(lambda points_N3: np.ones(len(points_N3)), LOW, HIGH, 16, steps=2)
+    assert full.volume == pytest.approx(1, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
