@@ -24,7 +24,9 @@ SEED, INDEX = 99, 3
 def main() -> None:
     """A mug 16 cm large, 50 cm away, seen from above by a parallel pair."""
     K = np.array([[FOCAL, 0, (WIDTH - 1) / 2], [0, FOCAL, (HEIGHT - 1) / 2], [0, 0, 1]])
-    poses = [np.diag([1.0, -1, -1, 1]) for _ in range(2)]  # +Y up, +Z backwards, so that light falls from above
+    poses = [
+        np.diag([1.0, -1, -1, 1]) for _ in range(2)
+    ]  # +Y up, +Z backwards, so that light falls from above
     poses[1][0, 3] = -BASELINE
     rig = StereoRig(*(Camera(K, pose, WIDTH, HEIGHT) for pose in poses))
     rotation = Rotation.from_euler("XY", [30, -35], degrees=True)

@@ -173,7 +173,7 @@ def _write(
         raise UserError("onnx=true: needs the extra onnx; pip install 'stereo-occ[onnx]'") from error
     assert program is not None
     content = io.BytesIO()
-    program.save(content)
+    program.save(content)  # type: ignore[arg-type]  # onnx writes to files as well
     write_whole(path, content.getvalue())
 
 

@@ -57,7 +57,7 @@ def _seen(
     towards_V3 /= np.linalg.norm(towards_V3, axis=1, keepdims=True)
     square_V = np.einsum("vi,vi->v", towards_V3, mesh.vertex_normals)
     pixels_V2 = camera.pixels(np.asarray(mesh.vertices))
-    inside_V = ((pixels_V2 >= 0) & (pixels_V2 <= [width - 1, height - 1])).all(axis=1)
+    inside_V: NDArray[np.bool_] = np.all((pixels_V2 >= 0) & (pixels_V2 <= [width - 1, height - 1]), axis=1)
     inside_V[inside_V] = within_HW[tuple(np.rint(pixels_V2[inside_V]).astype(np.intp).T[::-1])]
     facing = np.flatnonzero((square_V > 0.05) & inside_V)
     origins_N3 = mesh.vertices[facing] + clearance * mesh.vertex_normals[facing]
