@@ -2,6 +2,7 @@
 
 import functools
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -77,7 +78,7 @@ def entry_point(
                     config_dir=Path(arguments.config_dir) if arguments.config_dir else None,
                 )
                 if problems:
-                    _report(problems)
+                    _report([_by_alias(problem, aliases or {}) for problem in problems])
                     raise SystemExit(2)
             try:
                 with _errors_raised() if arguments.multirun else nullcontext():
@@ -110,6 +111,12 @@ def compose_config(config_name: str, overrides: Sequence[str] = ()) -> DictConfi
 def _by_key(argument: str, aliases: Mapping[str, str]) -> str:
     key, equals, value = argument.partition("=")
     return f"{aliases[key]}={value}" if equals and key in aliases else argument
+
+
+def _by_alias(problem: str, aliases: Mapping[str, str]) -> str:
+    for alias, key in aliases.items():
+        problem = re.sub(rf"\b{key}(?=[:=])", alias, problem)
+    return problem
 
 
 def _runs_elsewhere() -> bool:

@@ -11,11 +11,11 @@ from stereo_occ.checkpoint import KEY, VERSION, read_checkpoint
 from stereo_occ.cli import entry_point
 from stereo_occ.errors import UserError
 from stereo_occ.inference_config import ExportConfig
-from stereo_occ.mesh_output import write_whole
 from stereo_occ.model_card import model_card, training_command
 from stereo_occ.onnx_export import export_onnx
 from stereo_occ.packaged import SUFFIX, write_weights
 from stereo_occ.trained import load_trained
+from stereo_occ.writing import write_whole
 
 logger = logging.getLogger(__name__)
 

@@ -1,7 +1,5 @@
 """Finished meshes: fewer faces where the surface is flat, and files."""
 
-import os
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +7,7 @@ import numpy as np
 from manifold3d import Error, Manifold, Mesh64
 from trimesh import Trimesh
 
-from stereo_occ.errors import UserError
+from stereo_occ.writing import write_whole
 
 #: Endings of the files that can be written.
 FORMATS = (".glb", ".obj", ".ply", ".stl")
@@ -46,20 +44,3 @@ def write_mesh(mesh: Trimesh, path: Path) -> None:
     }
     data = mesh.export(file_type=kind, **options.get(kind, {}))
     write_whole(path, data if isinstance(data, bytes) else str(data).encode())
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all.
-
-    Raises:
-        UserError: it cannot be written.
-    """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(data)
-        partial.replace(path)
-    except OSError as error:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
-        raise UserError(f"output={path}: cannot be written ({error.strerror or error})") from error

@@ -18,10 +18,10 @@ from torch import Tensor, nn
 from torch.export import Dim
 
 from stereo_occ.errors import UserError
-from stereo_occ.mesh_output import write_whole
 from stereo_occ.models.base import OccupancyModel, StereoViews
 from stereo_occ.models.pixel_stereo import PixelStereoModel
 from stereo_occ.models.stereo import StereoModel
+from stereo_occ.writing import write_whole
 
 #: The first with grid_sample of volumes.
 OPSET = 20

@@ -17,11 +17,12 @@ from typing import Any
 
 import torch
 from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file, save
 from torch import Tensor
 
 from stereo_occ.errors import UserError
 from stereo_occ.paths import PACKAGE
+from stereo_occ.writing import write_whole
 
 #: What is shipped.
 FOLDER = PACKAGE / "weights"
@@ -86,9 +87,6 @@ def write_weights(
     }
     if not all(torch.isfinite(tensor).all() for tensor in tensors.values() if tensor.is_floating_point()):
         raise UserError("half=true: some weights are too large for half precision; use half=false")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.part")
-    save_file(tensors, partial)
     text = json.dumps(description, indent=2, ensure_ascii=False) + "\n"
-    path.with_suffix(".json").write_text(text, encoding="utf-8")
-    partial.replace(path)
+    write_whole(path.with_suffix(".json"), text.encode())
+    write_whole(path, save(tensors))

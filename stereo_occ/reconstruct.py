@@ -13,9 +13,10 @@ from stereo_occ import __version__
 from stereo_occ.cli import entry_point
 from stereo_occ.errors import UserError
 from stereo_occ.inference_config import Frame, ReconstructConfig
-from stereo_occ.mesh_output import FORMATS, write_mesh, write_whole
+from stereo_occ.mesh_output import FORMATS, write_mesh
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.reconstructor import Reconstruction, Reconstructor, SurfaceOptions
+from stereo_occ.writing import write_whole
 
 logger = logging.getLogger(__name__)
 

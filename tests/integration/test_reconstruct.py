@@ -113,6 +113,12 @@ def test_a_mistake_is_one_line_exit_code_2_and_no_file(checkpoint, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_what_is_missing_is_named_as_it_is_given(tmp_path):
+    done = program("-m", "stereo_occ.reconstruct", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "stereo_occ: rig: no value given; add rig=..." in done.stderr.splitlines()
+
+
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
