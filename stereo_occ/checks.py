@@ -19,6 +19,7 @@ from stereo_occ.data.splits import SUBSETS, split_views, subset_sizes
 from stereo_occ.errors import UserError
 from stereo_occ.models.build import build_model
 from stereo_occ.optimization import OPTIMIZERS, SCHEDULES
+from stereo_occ.packaged import find_weights
 from stereo_occ.problems import nearest
 from stereo_occ.shapes.shape import CATEGORIES
 
@@ -63,7 +64,7 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
     ]
     if cfg.checkpoint is None and cfg.baseline is None:
         problems.append("checkpoint: no value given; add checkpoint=... or baseline=...")
-    elif cfg.checkpoint is not None and not Path(cfg.checkpoint).is_file():
+    elif cfg.checkpoint is not None and not (Path(cfg.checkpoint).is_file() or find_weights(cfg.checkpoint)):
         problems.append(
             f"checkpoint={cfg.checkpoint}: no such file; give the path of a .ckpt file of a training run"
         )
