@@ -26,6 +26,7 @@ from lightning.pytorch import Callback, LightningModule, Trainer
 
 from stereo_occ.provenance import environment
 from stereo_occ.task import OccupancyTask
+from stereo_occ.writing import whole_file
 
 
 class WriteMetrics(Callback):
@@ -78,6 +79,5 @@ def write_json(path: Path, content: Any) -> None:
         ValueError: a number is NaN or infinite, which JSON does not know.
     """
     text = json.dumps(content, indent=2, allow_nan=False) + "\n"
-    temporary = path.with_suffix(".part")
-    temporary.write_text(text)
-    temporary.replace(path)
+    with whole_file(path) as file:
+        file.write(text.encode())

@@ -20,7 +20,6 @@ from torch.export import Dim
 from stereo_occ.errors import UserError
 from stereo_occ.models.base import OccupancyModel, StereoViews
 from stereo_occ.models.pixel_stereo import PixelStereoModel
-from stereo_occ.models.stereo import StereoModel
 from stereo_occ.writing import write_whole
 
 #: The first with grid_sample of volumes.
@@ -41,17 +40,7 @@ class Encoder(nn.Module):
     ) -> tuple[Tensor, ...]:
         """The code's tensors, in the order of :func:`code_tensors`."""
         views = StereoViews(left_BCHW, right_BCHW, K_B233, camera_from_rig_B244)
-        code = self._stereo(views) if isinstance(self.model, StereoModel) else self.model.encode(views)
-        return tuple(tensor for _, tensor in code_tensors(code))
-
-    def _stereo(self, views: StereoViews) -> Tensor:
-        """As the model's, without its chunk, which fixes the number of pairs."""
-        assert isinstance(self.model, StereoModel)
-        features_BCHW = self.model.encoder(torch.cat([views.left_BCHW, views.right_BCHW]))
-        pairs = views.left_BCHW.shape[0]
-        volume = self.model.cost_volume(features_BCHW[:pairs], features_BCHW[pairs:], views)
-        code_BC: Tensor = self.model.summary(volume)
-        return code_BC
+        return tuple(tensor for _, tensor in code_tensors(self.model.encode(views)))
 
 
 class Decoder(nn.Module):

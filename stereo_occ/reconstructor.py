@@ -23,18 +23,14 @@ from stereo_occ.mesh_output import simplified
 from stereo_occ.models.base import StereoViews
 from stereo_occ.photographs.color import vertex_colors
 from stereo_occ.photographs.framing import Framing, frame_on_fixation, frame_on_object
-from stereo_occ.photographs.locate import Found, in_box, in_mask, on_plain_background
+from stereo_occ.photographs.given import SIDES, ImageFile, Pair, locate_pair, photo_of
+from stereo_occ.photographs.locate import Found
 from stereo_occ.photographs.outline import preview
-from stereo_occ.photographs.photo import Photo, read_mask, read_photo, seen_by
+from stereo_occ.photographs.photo import Photo, seen_by
 from stereo_occ.reconstruction import expected_iou, sample_cube
-from stereo_occ.trained import Predictor, TrainedModel, load_trained
+from stereo_occ.trained import Predictor, load_trained
 
 logger = logging.getLogger(__name__)
-
-SIDES = ("left", "right")
-
-Pair = tuple[Any, Any]
-ImageFile = str | Path | NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -159,11 +155,6 @@ class Reconstructor:
             trained = load_trained(str(checkpoint))
         return cls(trained.config, trained.predict, trained.threshold, trained.name)
 
-    @classmethod
-    def from_model(cls, trained: TrainedModel) -> Self:
-        """Of a model in memory."""
-        return cls(trained.config, trained.predict, trained.threshold, trained.name)
-
     def __call__(
         self,
         left: ImageFile,
@@ -196,12 +187,12 @@ class Reconstructor:
         seconds: dict[str, float] = {}
         with _timed(seconds, "read"):
             pair = rig if isinstance(rig, RealPair) else read_calibration(rig, unit, rectified)
-            photos = _photo(left, "left"), _photo(right, "right")
+            photos = photo_of(left, "left"), photo_of(right, "right")
             pair = pair.fitted((photos[0].size, photos[1].size))
         on_object = isinstance(self.config.rig, RectifiedRigConfig)
         given = center is not None and size is not None
         with _timed(seconds, "locate"):
-            found = _locate(photos, boxes, masks, required=on_object and not given)
+            found = locate_pair(photos, boxes, masks, required=on_object and not given)
         with _timed(seconds, "frame"):
             framing = self._frame(pair, found, center, size)
             views = self._views(pair, photos, found, framing)
@@ -291,51 +282,6 @@ class Reconstructor:
             torch.as_tensor(np.stack([camera.K for camera in cameras]), dtype=torch.float32)[None],
             torch.as_tensor(np.stack([c.camera_from_rig for c in cameras]), dtype=torch.float32)[None],
         )
-
-
-def _photo(image: ImageFile, name: str) -> Photo:
-    if not isinstance(image, np.ndarray):
-        return read_photo(Path(image), name)
-    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
-        raise UserError(f"{name}: an array must be (H, W, 3) of uint8, got {image.shape} of {image.dtype}")
-    return Photo(image)
-
-
-def _locate(
-    photos: tuple[Photo, Photo], boxes: Pair, masks: Pair, required: bool
-) -> tuple[Found, Found] | None:
-    """Both, or neither where that is not required."""
-    found = [_given(*part) for part in zip(photos, boxes, masks, SIDES, strict=True)]
-    if found[0] is not None and found[1] is not None:
-        return found[0], found[1]
-    if found[0] is not None or found[1] is not None:
-        have, lack = SIDES if found[0] is not None else SIDES[::-1]
-        raise UserError(
-            f"{lack}: where the object is was given for the {have} image alone; give {lack}_box= too"
-        )
-    if not required:
-        return None
-    left, right = (
-        on_plain_background(photo.rgb_HW3, side) for photo, side in zip(photos, SIDES, strict=True)
-    )
-    return left, right
-
-
-def _given(photo: Photo, box: Any, mask: Any, name: str) -> Found | None:
-    mask_HW = photo.mask_HW
-    if mask is not None:
-        if isinstance(mask, np.ndarray):
-            if mask.shape != photo.rgb_HW3.shape[:2] or not mask.any():
-                raise UserError(f"{name}_mask: must have the image's size and true pixels, got {mask.shape}")
-            mask_HW = mask.astype(bool)
-        else:
-            mask_HW = read_mask(Path(mask), f"{name}_mask", photo.size)
-    if mask_HW is not None and not mask_HW.any():
-        raise UserError(f"{name}: the image is transparent everywhere, so no object is seen")
-    if box is not None:
-        found = in_box(box, photo.size, f"{name}_box")
-        return found if mask_HW is None else Found(found.outline_N2, mask_HW, "box and mask")
-    return None if mask_HW is None else in_mask(mask_HW)
 
 
 @contextmanager

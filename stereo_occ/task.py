@@ -93,39 +93,24 @@ class OccupancyTask(lightning.LightningModule):
         if self.average is not None:  # after the callbacks, which draw and save
             self.average.swap()
 
-    def _evaluation_step(self, batch: Batch, stage: str) -> dict[str, Tensor]:
+    def on_validation_epoch_start(self) -> None:
+        self.scores = Scores()
+
+    def validation_step(self, batch: Batch, batch_idx: int) -> dict[str, Tensor]:
         code = self.model.encode(batch.views)
         logits = {
             name: self.model.decode_all(code, q.points_BN3).float() for name, q in batch.queries.items()
         }
         self.scores.update(batch, logits)
         loss = binary_cross_entropy_with_logits(logits["bbox"], batch.queries["bbox"].occupied_BN)
-        self.log(f"{stage}/loss", loss, batch_size=len(batch))
+        self.log("val/loss", loss, batch_size=len(batch))
         return logits
-
-    def _log_scores(self, stage: str) -> None:
-        values = self.scores.summary(float(self.threshold)) | {"iou_at_0.5": self.scores.summary(0.5)["iou"]}
-        self.log_dict({f"{stage}/{name}": value for name, value in values.items()})
-        self.log(f"{stage}/threshold", self.threshold)
-
-    def on_validation_epoch_start(self) -> None:
-        self.scores = Scores()
-
-    def validation_step(self, batch: Batch, batch_idx: int) -> dict[str, Tensor]:
-        return self._evaluation_step(batch, "val")
 
     def on_validation_epoch_end(self) -> None:
         self.threshold.fill_(self.scores.best_threshold())
-        self._log_scores("val")
-
-    def on_test_epoch_start(self) -> None:
-        self.scores = Scores()
-
-    def test_step(self, batch: Batch, batch_idx: int) -> dict[str, Tensor]:
-        return self._evaluation_step(batch, "test")
-
-    def on_test_epoch_end(self) -> None:
-        self._log_scores("test")
+        values = self.scores.summary(float(self.threshold)) | {"iou_at_0.5": self.scores.summary(0.5)["iou"]}
+        self.log_dict({f"val/{name}": value for name, value in values.items()})
+        self.log("val/threshold", self.threshold)
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
         optimizer = build_optimizer(self.config.optimizer, self)

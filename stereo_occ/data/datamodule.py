@@ -125,10 +125,6 @@ class PairsDataModule(lightning.LightningDataModule):
         """Validation objects with fixed points."""
         return self.evaluation_loader("val")
 
-    def test_dataloader(self) -> DataLoader[Batch]:
-        """Test objects with fixed points."""
-        return self.evaluation_loader("test")
-
     def evaluation_loader(self, subset: str) -> DataLoader[Batch]:
         """Fixed points on any subset."""
         return self._loader(self.evaluation_dataset(subset), batch_size=self.evaluation_batch_size)

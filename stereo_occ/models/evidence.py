@@ -1,6 +1,7 @@
 """What a calibrated pair says about points: features of both views, and how well they agree."""
 
 from collections.abc import Callable
+from functools import reduce
 from math import pi
 
 import torch
@@ -54,7 +55,8 @@ class PairEvidence(nn.Module):
         seen_VB1N = points.visible_VBN[:, :, None].to(samples_VBCN.dtype)
         count_B1N = seen_VB1N.sum(dim=0)
         weights_VB1N = seen_VB1N / count_B1N.clamp(min=1)
-        mean_BCN = sum(view * weight for view, weight in zip(views_VBCN, weights_VB1N, strict=True))
+        weighted = (view * weight for view, weight in zip(views_VBCN, weights_VB1N, strict=True))
+        mean_BCN = reduce(torch.add, weighted)
         left_BCN, right_BCN = samples_VBCN[0], samples_VBCN[-1]
         both_B1N = (count_B1N == 2).to(samples_VBCN.dtype)
         correlation_BGN = groupwise_correlation(left_BCN, right_BCN, self.groups) * both_B1N

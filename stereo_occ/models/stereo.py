@@ -66,8 +66,9 @@ class StereoModel(OccupancyModel):
 
     def encode(self, views: StereoViews) -> Tensor:
         """Codes ``(B, code_size)``."""
-        left_BCHW, right_BCHW = self.encoder(torch.cat([views.left_BCHW, views.right_BCHW])).chunk(2)
-        code_BC: Tensor = self.summary(self.cost_volume(left_BCHW, right_BCHW, views))
+        features_BCHW = self.encoder(torch.cat([views.left_BCHW, views.right_BCHW]))
+        pairs = views.left_BCHW.shape[0]
+        code_BC: Tensor = self.summary(self.cost_volume(features_BCHW[:pairs], features_BCHW[pairs:], views))
         return code_BC
 
     def decode(self, code: Tensor, points_BN3: Tensor) -> Tensor:

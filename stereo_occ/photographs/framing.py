@@ -48,11 +48,6 @@ class Framing:
     unit: float
 
 
-def needs_object(config: RigConfig) -> bool:
-    """Whether the views depend on where the object is."""
-    return isinstance(config, RectifiedRigConfig)
-
-
 def frame_on_object(
     pair: RealPair,
     config: RectifiedRigConfig,

@@ -6,10 +6,7 @@ nor a changed repair meets an old result. It appears under its name only when it
 
 import hashlib
 import json
-import os
-import socket
 import zipfile
-from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from io import BytesIO
@@ -24,6 +21,7 @@ from trimesh import Trimesh
 from stereo_occ.errors import UserError
 from stereo_occ.shapes.inspection import Inspection, inspect_mesh
 from stereo_occ.shapes.reading import digest, read_below
+from stereo_occ.writing import whole_file
 
 #: What reading an entry raises that is not there or not whole.
 DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
@@ -91,21 +89,13 @@ def save(inspection: Inspection, entry: Path) -> None:
     }
     content = BytesIO()
     np.savez(content, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **arrays)  # type: ignore[arg-type]
-    temporary = entry.with_name(f".{entry.name}.{socket.gethostname()}.{os.getpid()}.part")
     try:
-        entry.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("wb") as file:
+        with whole_file(entry) as file:
             file.write(content.getbuffer())
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(entry)
     except OSError as error:
         raise UserError(
             f"{entry.parent}: cannot be written ({error}); free some disk space or set paths.data"
         ) from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def load(entry: Path, header_only: bool = False) -> Inspection:

@@ -1,0 +1,70 @@
+"""What the user gives of a pair: two images, and where the object is in them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereo_occ.errors import UserError
+from stereo_occ.photographs.locate import Found, in_box, in_mask, on_plain_background
+from stereo_occ.photographs.photo import Photo, read_mask, read_photo
+
+SIDES = ("left", "right")
+
+Pair = tuple[Any, Any]
+ImageFile = str | Path | NDArray[np.uint8]
+
+
+def photo_of(image: ImageFile, name: str) -> Photo:
+    """A photograph from a file or from RGB ``(H, W, 3)``.
+
+    Raises:
+        UserError: it is neither; ``name`` is what the message calls it.
+    """
+    if not isinstance(image, np.ndarray):
+        return read_photo(Path(image), name)
+    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
+        raise UserError(f"{name}: an array must be (H, W, 3) of uint8, got {image.shape} of {image.dtype}")
+    return Photo(image)
+
+
+def locate_pair(
+    photos: tuple[Photo, Photo], boxes: Pair, masks: Pair, required: bool
+) -> tuple[Found, Found] | None:
+    """Where the object is in both images, or None where that is neither given nor ``required``.
+
+    Raises:
+        UserError: it is given for one image alone or wrongly, or not found though it is required.
+    """
+    found = [_given(*part) for part in zip(photos, boxes, masks, SIDES, strict=True)]
+    if found[0] is not None and found[1] is not None:
+        return found[0], found[1]
+    if found[0] is not None or found[1] is not None:
+        have, lack = SIDES if found[0] is not None else SIDES[::-1]
+        raise UserError(
+            f"{lack}: where the object is was given for the {have} image alone; give {lack}_box= too"
+        )
+    if not required:
+        return None
+    left, right = (
+        on_plain_background(photo.rgb_HW3, side) for photo, side in zip(photos, SIDES, strict=True)
+    )
+    return left, right
+
+
+def _given(photo: Photo, box: Any, mask: Any, name: str) -> Found | None:
+    mask_HW = photo.mask_HW
+    if mask is not None:
+        if isinstance(mask, np.ndarray):
+            if mask.shape != photo.rgb_HW3.shape[:2] or not mask.any():
+                raise UserError(f"{name}_mask: must have the image's size and true pixels, got {mask.shape}")
+            mask_HW = mask.astype(bool)
+        else:
+            mask_HW = read_mask(Path(mask), f"{name}_mask", photo.size)
+    if mask_HW is not None and not mask_HW.any():
+        raise UserError(f"{name}: the image is transparent everywhere, so no object is seen")
+    if box is not None:
+        found = in_box(box, photo.size, f"{name}_box")
+        return found if mask_HW is None else Found(found.outline_N2, mask_HW, "box and mask")
+    return None if mask_HW is None else in_mask(mask_HW)
