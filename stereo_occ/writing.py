@@ -10,6 +10,11 @@ from typing import BinaryIO
 from stereo_occ.errors import UserError
 
 
+def partial_path(path: Path, host: str, process: int) -> Path:
+    """Where a process of a machine writes a file before it gets its name."""
+    return path.with_name(f".{path.name}.{host}.{process}.part")
+
+
 @contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
     """A file to write that gets its name when it is complete and on the disk; if that fails, ``path`` is as before.
@@ -17,7 +22,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
     Raises:
         OSError: it cannot be written.
     """
-    partial = path.with_name(f".{path.name}.{socket.gethostname()}.{os.getpid()}.part")
+    partial = partial_path(path, socket.gethostname(), os.getpid())
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with partial.open("wb") as file:

@@ -4,7 +4,6 @@ import hashlib
 import json
 import multiprocessing
 import os
-import socket
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -25,11 +24,12 @@ from stereo_occ.data.pairs import POINTS_STREAM, render_views
 from stereo_occ.data.processes import start_worker
 from stereo_occ.data.rigs import ToedInRigConfig
 from stereo_occ.data.shard import VERSION
-from stereo_occ.data.shard_writing import partial_path, remove_partial, write_shard
+from stereo_occ.data.shard_writing import remove_partial, write_shard
 from stereo_occ.errors import UserError
 from stereo_occ.occupancy.pools import box_pool, surface_pool
 from stereo_occ.render.stereo import StereoRenderer
 from stereo_occ.shapes.layouts import Skipped
+from stereo_occ.writing import whole_file
 
 
 @dataclass(frozen=True)
@@ -174,10 +174,8 @@ def _plain(value: object) -> object:
 def _write_description(folder: Path, pairs: PairsConfig) -> None:
     text = json.dumps(_description(pairs), indent=2, sort_keys=True) + "\n"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        temporary = partial_path(folder / "dataset.json", socket.gethostname(), os.getpid())
-        temporary.write_text(text)
-        temporary.replace(folder / "dataset.json")
+        with whole_file(folder / "dataset.json") as file:
+            file.write(text.encode())
     except OSError as error:
         raise UserError(
             f"paths.data={pairs.paths.data}: cannot be written ({error}); give another folder"

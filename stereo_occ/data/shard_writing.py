@@ -19,6 +19,7 @@ from stereo_occ.data.shard import FORMAT, VERSION, Views, checksum_path
 from stereo_occ.errors import UserError
 from stereo_occ.occupancy.pools import PointPool
 from stereo_occ.shapes.shape import Shape
+from stereo_occ.writing import partial_path
 
 POINTS_PER_CHUNK = 8192
 
@@ -79,11 +80,6 @@ def _file_image(shape: Shape, views: Views, pools: Mapping[str, PointPool]) -> m
             _write(file, f"points/{name}/bounds", np.stack([pool.low_3, pool.extent_3]))
             _write(file, f"points/{name}/part", pool.part_N, chunk_length=POINTS_PER_CHUNK)
     return image.getbuffer()
-
-
-def partial_path(path: Path, host: str, process: int) -> Path:
-    """Where a process writes a shard before it gets its name."""
-    return path.with_name(f".{path.name}.{host}.{process}.part")
 
 
 def remove_partial(folder: Path) -> None:
