@@ -147,6 +147,8 @@ def _appearance(cfg: DictConfig) -> Iterator[str]:
         if len(cfg.background[key]) != 3:
             yield f"background.{key}={cfg.background[key]}: must be three values, red, green and blue"
             return
+    if not 0 <= cfg.background.masked <= 1:
+        yield f"background.masked={cfg.background.masked}: is a share of the view pairs, 0 to 1"
     parts = {name: OmegaConf.to_object(cfg[name]) for name in LOOKS}
     yield from _refusal(check_look, *(parts[name] for name in LOOKS))
 

@@ -258,7 +258,7 @@ class Reconstructor:
         """What the model is given: cut, straightened, and behind the object what it was trained with."""
         background = self.config.background
         masks = None if found is None or found[0].mask_HW is None or found[1].mask_HW is None else found
-        if background.masked and masks is None:
+        if background.masked == 1 and masks is None:
             raise UserError(
                 f"the checkpoint {self.name} was trained on pictures without a background: give left_mask= and "
                 f"right_mask=, or images that are transparent around the object"

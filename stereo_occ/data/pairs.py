@@ -1,6 +1,7 @@
 """The pictures of one object: scenes and appearances drawn from a configuration, and rendered."""
 
 from dataclasses import replace
+from enum import IntEnum
 
 import numpy as np
 
@@ -14,8 +15,11 @@ from stereo_occ.render.sensor import photograph
 from stereo_occ.render.stereo import StereoImages, StereoRenderer
 from stereo_occ.shapes.shape import Shape
 
-# Independent random streams of one object. What is drawn from one does not change what is drawn from another.
-POINTS_STREAM, VIEWS_STREAM, SCENE_STREAM, TEXTURE_STREAM, CLUTTER_STREAM, SENSOR_STREAM = range(6)
+
+class Stream(IntEnum):
+    """Independent random streams of one object: what is drawn from one does not change what another gives."""
+
+    POINTS, VIEWS, SCENE, TEXTURE, CLUTTER, SENSOR, MASK = range(7)
 
 
 def render_views(shape: Shape, pairs: PairsConfig, object_seed: list[int], renderer: StereoRenderer) -> Views:
@@ -32,12 +36,12 @@ def render_views(shape: Shape, pairs: PairsConfig, object_seed: list[int], rende
     pictures: list[StereoImages] = []
     for view in range(pairs.data.views):
 
-        def stream(number: int, view: int = view) -> np.random.Generator:
+        def stream(number: Stream, view: int = view) -> np.random.Generator:
             return np.random.default_rng([*object_seed, number, view])
 
-        rng = stream(VIEWS_STREAM)
+        rng = stream(Stream.VIEWS)
         scene = draw_scene(
-            pairs.rig, pairs.placement, pairs.data.image_side, hull_N3, rng, stream(SCENE_STREAM)
+            pairs.rig, pairs.placement, pairs.data.image_side, hull_N3, rng, stream(Stream.SCENE)
         )
         appearance = dressed(
             draw_appearance(pairs.lights, pairs.material, pairs.background, rng),
@@ -46,12 +50,11 @@ def render_views(shape: Shape, pairs: PairsConfig, object_seed: list[int], rende
             scene,
             hull_N3,
             shape.colors is not None,
-            [stream(TEXTURE_STREAM), stream(CLUTTER_STREAM)],
+            [stream(Stream.TEXTURE), stream(Stream.CLUTTER)],
         )
         images = renderer.render(scene.true_rig, scene.pose.rig_from_object, appearance)
-        rgb_2HW3 = photograph(
-            images, scene.true_rig, pairs.sensor, appearance, pairs.background.masked, stream(SENSOR_STREAM)
-        )
+        masked = bool(stream(Stream.MASK).random() < pairs.background.masked)
+        rgb_2HW3 = photograph(images, scene.true_rig, pairs.sensor, appearance, masked, stream(Stream.SENSOR))
         pictures.append(replace(images, rgb_2HW3=rgb_2HW3))
         scenes.append(scene)
     unit_N = np.array([scene.unit for scene in scenes])

@@ -20,7 +20,7 @@ from stereo_occ.config import PairsConfig
 from stereo_occ.data.config import NOT_CONTENT, SliceConfig
 from stereo_occ.data.meshes import MeshRecord
 from stereo_occ.data.objects import ObjectSource, list_objects, members
-from stereo_occ.data.pairs import POINTS_STREAM, render_views
+from stereo_occ.data.pairs import Stream, render_views
 from stereo_occ.data.processes import start_worker
 from stereo_occ.data.rigs import ToedInRigConfig
 from stereo_occ.data.shard import VERSION
@@ -100,7 +100,7 @@ def render_object(source: ObjectSource, path: Path, pairs: PairsConfig) -> None:
     data = pairs.data
     shape = source.build()
     object_seed = [data.seed, crc32(f"{source.category}/{source.object_id}".encode())]
-    points_rng = np.random.default_rng([*object_seed, POINTS_STREAM])
+    points_rng = np.random.default_rng([*object_seed, Stream.POINTS])
     pools = {
         "box": box_pool(shape, data.pool_size, points_rng),
         "surface": surface_pool(shape, data.pool_size, points_rng),

@@ -61,7 +61,9 @@ class BackgroundConfig:
     low: list[float] = MISSING  # red, green, blue display values, 0 to 1
     high: list[float] = MISSING
     contrast: float = MISSING  # least distance in display RGB from the object's base colour
-    masked: bool = False  # that colour replaces, in the finished picture, all but the object
+    masked: float = (
+        0.0  # share of view pairs where that colour replaces all but the object, after the cameras
+    )
     clutter: ClutterConfig | None = None  # things in place of the colour
 
 

@@ -60,6 +60,7 @@ def valid():
         ("rig.distance=0", "rig.distance=0.0: must be above 0"),
         ("lights.count=[2,9]", "lights.count: must be [low, high]"),
         ("material.hue=[0,2]", "material.hue: must be [low, high]"),
+        ("background.masked=2", "background.masked=2.0: is a share of the view pairs"),
         ("background.low=[0,0]", "background.low=[0.0, 0.0]: must be three values"),
         ("queries.box=2", "queries=[2.0, 0.0, 0.0]: box, outside and surface must be shares"),
         ("trainer.precision=16", "trainer.precision=16: unknown; known: 16-mixed, 32-true, bf16-mixed"),

@@ -44,7 +44,17 @@ def test_a_variation_does_not_change_what_another_one_draws(views):
 
 def test_masked_pictures_are_the_papers(views):
     np.testing.assert_array_equal(views("background=masked").rgb, views().rgb)
-    np.testing.assert_array_equal(views("background=clutter", "background.masked=true").rgb[0, :, 0, 0], 255)
+    np.testing.assert_array_equal(views("background=clutter", "background.masked=1").rgb[0, :, 0, 0], 255)
+
+
+def test_a_share_of_the_pairs_is_masked(views):
+    cluttered, some, masked = (
+        views("background=clutter", f"background.masked={share}", "data.views=8").rgb for share in (0, 0.5, 1)
+    )
+    like_cluttered = (some == cluttered).all(axis=(1, 2, 3, 4))
+    like_masked = (some == masked).all(axis=(1, 2, 3, 4))
+    assert (like_cluttered ^ like_masked).all()
+    assert like_cluttered.any() and like_masked.any()
 
 
 def test_everything_composes(views):
