@@ -15,7 +15,7 @@ import numpy as np
 
 from stereo_occ.comparison_plot import forest_plot
 from stereo_occ.errors import UserError
-from stereo_occ.evaluation_rows import Evaluations, read_evaluations
+from stereo_occ.evaluation_rows import Evaluations, find_evaluations, read_evaluations
 from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 from stereo_occ.metrics.summary import METRICS
 from stereo_occ.metrics_file import write_json
@@ -43,7 +43,7 @@ def compare(
     Raises:
         UserError: the sides were not measured on the same objects and views in the same way, or lack a metric.
     """
-    _check_alike(a, b)
+    check_alike(a, b)
     shared = [name for name in METRICS if name in a.values and name in b.values]
     for name in metrics or ():
         if name not in shared:
@@ -86,7 +86,8 @@ def table(results: Results) -> str:
     return "\n".join(lines)
 
 
-def _check_alike(a: Evaluations, b: Evaluations) -> None:
+def check_alike(a: Evaluations, b: Evaluations) -> None:
+    """Refuse results that were not measured on the same objects and views in the same way."""
     if set(a.keys) != set(b.keys):
         only_a, only_b = (sorted(set(x.keys) - set(y.keys)) for x, y in ((a, b), (b, a)))
         first = "/".join(map(str, (only_a or only_b)[0]))
@@ -95,16 +96,17 @@ def _check_alike(a: Evaluations, b: Evaluations) -> None:
             f"second, such as {first}; evaluate both with the same data, subset and views"
         )
     for key in SAME:
-        if a.facts[key] != b.facts[key]:
+        of_a, of_b = a.facts[0][key], b.facts[0][key]
+        if of_a != of_b:
             raise UserError(
-                f"{a.name} and {b.name}: were measured with {key} {a.facts[key]} and {b.facts[key]}; "
-                f"evaluate both in the same way"
+                f"{a.name} and {b.name}: were measured with {key} {of_a} and {of_b}; evaluate both in the same way"
             )
 
 
 def _notes(a: Evaluations, b: Evaluations) -> list[str]:
+    facts_a, facts_b = a.facts[0], b.facts[0]
     return [
-        f"{key} differs: {a.facts[key]} | {b.facts[key]}" for key in NOTED if a.facts[key] != b.facts[key]
+        f"{key} differs: {facts_a[key]} | {facts_b[key]}" for key in NOTED if facts_a[key] != facts_b[key]
     ]
 
 
@@ -145,7 +147,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         if asked.draws < 1:
             raise UserError(f"--draws {asked.draws}: must be at least 1")
-        a, b = read_evaluations(asked.a), read_evaluations(asked.b)
+        a, b = (read_evaluations(name, find_evaluations(name)) for name in (asked.a, asked.b))
         results = compare(a, b, asked.metrics, asked.draws, asked.seed)
         asked.output.mkdir(parents=True, exist_ok=True)
         write_json(asked.output / "comparison.json", _record(a, b, results, asked.draws, asked.seed))

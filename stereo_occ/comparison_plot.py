@@ -17,7 +17,12 @@ _COLUMNS = 4
 def forest_plot(
     results: Mapping[str, Mapping[str, Difference]], name_a: str, name_b: str, path: Path
 ) -> None:
-    """Write A - B of every metric as PNG; green favours A, red favours B, grey leaves it open."""
+    """Write the figure as PNG."""
+    forest_figure(results, name_a, name_b).savefig(path, dpi=110)
+
+
+def forest_figure(results: Mapping[str, Mapping[str, Difference]], name_a: str, name_b: str) -> Figure:
+    """A - B of every metric; green favours A, red favours B, grey leaves it open."""
     rows = max(1, ceil(len(results) / _COLUMNS))
     figure = Figure(figsize=(3.2 * _COLUMNS, 0.6 + 1.7 * rows), layout="constrained")
     FigureCanvasAgg(figure)
@@ -27,7 +32,7 @@ def forest_plot(
     for axis in axes[len(results) :]:
         axis.set_axis_off()
     figure.suptitle(f"A - B with 95 % intervals\nA: {name_a}   B: {name_b}", fontsize=9)
-    figure.savefig(path, dpi=110)
+    return figure
 
 
 def _panel(axis: Axes, metric: str, differences: Mapping[str, Difference]) -> None:

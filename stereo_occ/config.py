@@ -21,6 +21,7 @@ from stereo_occ.data.placement import PlacementConfig
 from stereo_occ.data.rigs import RIG_SCHEMAS, RigConfig, ToedInRigConfig
 from stereo_occ.errors import UserError
 from stereo_occ.inference_config import ExportConfig, ReconstructConfig
+from stereo_occ.loggers.config import LoggerConfig
 from stereo_occ.models.config import register_schemas as register_model_schemas
 from stereo_occ.render.appearance import BackgroundConfig, LightsConfig, MaterialConfig
 from stereo_occ.render.sensor import SensorConfig
@@ -141,16 +142,6 @@ class TrainerConfig:
 
 
 @dataclass
-class LoggerConfig:
-    """What is written for TensorBoard."""
-
-    tensorboard: bool = MISSING
-    interval: int = MISSING  # steps between training losses
-    examples: int = MISSING  # pairs and meshes shown per category
-    mesh_resolution: int = MISSING  # cells per side of the shown meshes
-
-
-@dataclass
 class TrainConfig(PairsConfig):
     """``python -m stereo_occ.train``"""
 
@@ -190,6 +181,7 @@ class EvaluateConfig:
     mesh_resolution: int = MISSING  # cells per side of the cube
     surface_points: int = MISSING  # on each surface
     examples: int = MISSING  # meshes and pictures per category
+    keep: bool = True  # mesh, truth and pair of each object's first view, for the report; needs meshes of 1 or more
     data: Any = None
     rig: Any = None
     placement: Any = None

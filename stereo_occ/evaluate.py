@@ -3,6 +3,8 @@
 ``metrics.json`` has the keys of :mod:`stereo_occ.metrics_file` and:
     predictor: ``checkpoint`` or ``baseline`` with its settings.
     step, parameters: of the network; null for a baseline.
+    trained: of a network, its training's ``config`` and ``history`` (of the whole run where its ``metrics.json`` is
+        beside the checkpoint, else up to the checkpoint); null for a baseline.
     control: what the network was shown, see :mod:`stereo_occ.data.controls`; null for a baseline, which has no twin.
     config: the settings of the evaluation.
     subset, data, objects, views, points: what was measured, and the folder of its shards.
@@ -13,6 +15,9 @@
     meshes: how many views per object had their mesh measured, at which resolution, from how many points.
     reliability: per category, for each bin of probability: points, mean probability, share occupied (of the cube).
     metrics: ``test/<metric>`` (mean of category means), ``test/<metric>/<category>``, ``test/<metric>/all``.
+
+``curves.json`` has ``levels`` of the logit and, per category, ``empty`` and ``occupied``: how many such points of the
+cube lie below the first level, between two, above the last (:mod:`stereo_occ.metrics.curves`).
 """
 
 import logging
@@ -40,10 +45,12 @@ from stereo_occ.evaluation_data import (
     training_pairs,
 )
 from stereo_occ.evaluation_files import write_csv, write_examples
+from stereo_occ.kept_views import ViewKeeper
 from stereo_occ.measurement import Measurement, MeshSettings, measure
 from stereo_occ.metrics.calibration import expected_calibration_error
+from stereo_occ.metrics.curves import LEVELS
 from stereo_occ.metrics.summary import summarise
-from stereo_occ.metrics_file import write_json
+from stereo_occ.metrics_file import training_history, write_json
 from stereo_occ.predictors import LearnedPredictor, Predictor
 from stereo_occ.provenance import environment
 from stereo_occ.quiet import quiet_libraries
@@ -75,7 +82,7 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
         settings.subset = "all" if has_other_meshes(cfg, trained) else "test"
     data = evaluated_pairs(cfg, settings, trained)
     dataset = data.evaluation_dataset(settings.subset)
-    facts: dict[str, Any] = {"step": None, "parameters": None}
+    facts: dict[str, Any] = {"step": None, "parameters": None, "trained": None}
     predictor: Predictor
     if settings.baseline is not None:
         training = training_pairs(cfg, settings, trained)
@@ -87,6 +94,10 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
         facts = {
             "step": checkpoint["global_step"],
             "parameters": sum(p.numel() for p in task.model.parameters()),
+            "trained": {
+                "config": checkpoint[KEY]["config"],
+                "history": training_history(Path(str(settings.checkpoint)), checkpoint),
+            },
         }
         hardware = settings.trainer
         predictor = LearnedPredictor(
@@ -94,13 +105,23 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
         )
     folder.mkdir(parents=True, exist_ok=True)
     meshes = MeshSettings(settings.meshes, settings.mesh_resolution, settings.surface_points)
-    result = measure(predictor, dataset, data.evaluation_loader(settings.subset), meshes, settings.progress)
+    keeper = ViewKeeper(folder)
+    result = measure(
+        predictor,
+        dataset,
+        data.evaluation_loader(settings.subset),
+        meshes,
+        settings.progress,
+        keeper.keep if settings.keep else None,
+    )
+    keeper.write_index()
     metrics = _metrics(result, predictor.threshold)
     assert data.prepared is not None
     skipped = [vars(file) for file in data.prepared.skipped]
     write_csv(folder / "per_object.csv", result.rows)
     if skipped:
         write_csv(folder / "skipped.csv", skipped)
+    write_json(folder / "curves.json", _curves(result))
     write_json(
         folder / "metrics.json",
         environment()
@@ -162,6 +183,14 @@ def _config(cfg: DictConfig, settings: EvaluateConfig) -> dict[str, Any]:
 def _reliability(sums_3K: Any) -> list[list[float]]:
     """Points, mean probability and share occupied of each bin that has points."""
     return [[n, p / n, occupied / n] for n, p, occupied in sums_3K.T.tolist() if n]
+
+
+def _curves(result: Measurement) -> dict[str, Any]:
+    categories = {
+        name: {"empty": empty_K.tolist(), "occupied": occupied_K.tolist()}
+        for name, (empty_K, occupied_K) in result.counts.items()
+    }
+    return {"levels": LEVELS.tolist(), "categories": categories}
 
 
 @entry_point("evaluate", check_evaluation)

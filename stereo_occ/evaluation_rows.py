@@ -27,48 +27,62 @@ class Evaluations:
         name: as asked for.
         keys: the V object-views, in order.
         values: of each metric that applies to any of them ``(S, V)``; NaN where it does not.
-        facts: of the first one's ``metrics.json``.
+        facts: of each one's ``metrics.json``.
     """
 
     name: str
     folders: list[Path]
     keys: list[Key]
     values: dict[str, NDArray[np.float64]]
-    facts: dict[str, Any]
+    facts: list[dict[str, Any]]
 
 
-def read_evaluations(pattern: str) -> Evaluations:
-    """The evaluations in a folder, or in the folders that a pattern names.
+def find_evaluations(pattern: str) -> list[Path]:
+    """The folder of that name, or those that match the pattern.
 
     Raises:
-        UserError: there is none, one is of another version, or they are not of the same object-views.
+        UserError: there is none.
     """
     found = [pattern] if Path(pattern).is_dir() else sorted(glob(pattern))  # noqa: PTH207 (it may be absolute)
     folders = [Path(path) for path in found if Path(path).is_dir()]
     if not folders:
         raise UserError(f"{pattern}: no such folder; give the folder of an evaluation")
-    facts = [_facts(folder) for folder in folders]
+    return folders
+
+
+def read_evaluations(name: str, folders: Sequence[Path]) -> Evaluations:
+    """The evaluations in these folders as one model's.
+
+    Raises:
+        UserError: one is none or of another version, or they are not of the same object-views.
+    """
+    facts = [read_facts(folder) for folder in folders]
     tables = [_table(folder) for folder in folders]
     keys = sorted(tables[0])
     for folder, rows in zip(folders, tables, strict=True):
         if sorted(rows) != keys:
             raise UserError(
-                f"{pattern}: {folder} has other object-views than {folders[0]}; compare them one by one"
+                f"{name}: {folder} has other object-views than {folders[0]}; compare them one by one"
             )
     values = {
         metric: np.array([[rows[key].get(metric, np.nan) for key in keys] for rows in tables])
         for metric in METRICS
     }
     return Evaluations(
-        pattern,
-        folders,
+        name,
+        list(folders),
         keys,
         {metric: of_metric for metric, of_metric in values.items() if np.isfinite(of_metric).any()},
-        facts[0],
+        facts,
     )
 
 
-def _facts(folder: Path) -> dict[str, Any]:
+def read_facts(folder: Path) -> dict[str, Any]:
+    """What ``metrics.json`` of an evaluation says.
+
+    Raises:
+        UserError: there is none, or it is of another version.
+    """
     try:
         facts: dict[str, Any] = json.loads((folder / "metrics.json").read_text())
     except (OSError, ValueError) as error:

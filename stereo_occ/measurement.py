@@ -1,6 +1,6 @@
 """Every metric of every object-view, one row each: the same for networks and baselines."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -11,17 +11,21 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 from tqdm import tqdm
+from trimesh import Trimesh
 
 from stereo_occ.data.batch import Batch, map_tensors
 from stereo_occ.data.dataset import EvaluationPairs
 from stereo_occ.data.shard import Shard
-from stereo_occ.metrics.calibration import BINS
+from stereo_occ.metrics.curves import logit_counts
 from stereo_occ.metrics.mesh import MeshScores, compare_meshes
 from stereo_occ.metrics.points import point_metrics, region_metrics, reliability_sums
 from stereo_occ.metrics.regions import region_points
 from stereo_occ.metrics.summary import METRICS
 from stereo_occ.models.base import StereoViews
 from stereo_occ.predictors import ObjectView, Predictor
+
+#: Is given a view, its picture (``B = 1``), the predicted and the true mesh, both in the rig frame.
+Keep = Callable[[ObjectView, StereoViews, Trimesh, Trimesh], None]
 
 
 @dataclass(frozen=True)
@@ -40,11 +44,13 @@ class Measurement:
     Attributes:
         rows: one per object-view: ``category``, ``object_id``, ``view``, ``failure`` (empty where there is none) and
             every metric of :data:`~stereo_occ.metrics.summary.METRICS`, None where it does not apply.
-        reliability: by category, ``(3, BINS)`` sums over the points of the cube.
+        reliability: by category, sums of :func:`~stereo_occ.metrics.points.reliability_sums` over the cube's points.
+        counts: by category, sums of :func:`~stereo_occ.metrics.curves.logit_counts` likewise.
     """
 
     rows: list[dict[str, Any]] = field(default_factory=list)
     reliability: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    counts: dict[str, NDArray[np.int64]] = field(default_factory=dict)
 
 
 def measure(
@@ -53,8 +59,13 @@ def measure(
     batches: Iterable[Batch],
     meshes: MeshSettings,
     progress: bool = False,
+    keep: Keep | None = None,
 ) -> Measurement:
-    """Measure a predictor on the views of ``dataset``, which ``batches`` serves in order."""
+    """Measure a predictor on the views of ``dataset``, which ``batches`` serves in order.
+
+    Args:
+        keep: is called with the meshes of each object's first view, if they are measured.
+    """
     result = Measurement()
     with tqdm(total=len(dataset), desc="evaluating", unit="view", disable=not progress) as bar:
         for batch in batches:
@@ -71,16 +82,26 @@ def measure(
                 values |= point_metrics(of_view, occupied, predictor.threshold)
                 values |= region_metrics(answers, predictor.threshold)
                 failures = ["NaN"] if any(x.isnan().any() for x in of_view.values()) else []
-                if (first + i) % len(dataset.views) < meshes.views:
-                    scores = _mesh_scores(predictor, view, _only(batch.views, i), meshes)
+                place = (first + i) % len(dataset.views)  # among the object's views
+                if place < meshes.views:
+                    picture = _only(batch.views, i)
+                    predicted = predictor.mesh(view, picture, meshes.resolution)
+                    true = view.shard.mesh.apply_transform(view.pose.rig_from_object)
+                    if keep is not None and place == 0:
+                        keep(view, picture, predicted, true)
+                    scores = _mesh_scores(predicted, true, view, meshes.points)
                     values |= scores.values
                     failures += [scores.failure] if scores.failure else []
                 result.rows.append({**vars(batch.ids[i]), "failure": "; ".join(failures), **values})
-                sums_3K = reliability_sums(of_view["cube"], occupied["cube"])
-                category = view.shard.category
-                result.reliability[category] = result.reliability.get(category, np.zeros((3, BINS))) + sums_3K
+                cube = of_view["cube"], occupied["cube"]
+                _add(result.reliability, view.shard.category, reliability_sums(*cube))
+                _add(result.counts, view.shard.category, logit_counts(*cube))
             bar.update(len(batch))
     return result
+
+
+def _add(sums: dict[str, NDArray[Any]], category: str, more: NDArray[Any]) -> None:
+    sums[category] = sums[category] + more if category in sums else more
 
 
 def _regions(view: ObjectView) -> dict[str, NDArray[np.float64]]:
@@ -112,13 +133,9 @@ def _only(views: StereoViews, index: int) -> StereoViews:
     return map_tensors(views, lambda tensor: tensor[index : index + 1])
 
 
-def _mesh_scores(
-    predictor: Predictor, view: ObjectView, picture: StereoViews, settings: MeshSettings
-) -> MeshScores:
-    predicted = predictor.mesh(view, picture, settings.resolution)
-    true = view.shard.mesh.apply_transform(view.pose.rig_from_object)
+def _mesh_scores(predicted: Trimesh, true: Trimesh, view: ObjectView, points: int) -> MeshScores:
     camera_from_rig_244 = view.shard.cameras(view.view)[1]
     centers_23 = np.linalg.inv(camera_from_rig_244)[:, :3, 3].astype(np.float64)
     name = f"{view.shard.category}/{view.shard.object_id}"
     rng = np.random.default_rng([crc32(name.encode()), view.view])
-    return compare_meshes(predicted, true, centers_23, settings.points, rng)
+    return compare_meshes(predicted, true, centers_23, points, rng)

@@ -66,6 +66,21 @@ class WriteMetrics(Callback):
         )
 
 
+def training_history(checkpoint_path: Path, checkpoint: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The validations of the training that wrote a checkpoint, as in its ``metrics.json``; empty if they are not known.
+
+    All of them where that file is beside the checkpoint and has its step, else those up to the checkpoint.
+    """
+    callbacks: dict[str, Any] = checkpoint.get("callbacks", {})
+    own: list[dict[str, Any]] = callbacks.get(WriteMetrics.__name__, {}).get("history", [])
+    try:
+        content = json.loads((checkpoint_path.parent / "metrics.json").read_text())
+        whole: list[dict[str, Any]] = content["history"]
+        return whole if own and own == whole[: len(own)] else own
+    except (OSError, ValueError, KeyError, TypeError):
+        return own
+
+
 def without_nan(values: Mapping[str, float]) -> dict[str, Any]:
     """The values with null for those that are not finite, whose names are then listed under ``not_finite``."""
     lost = [name for name, value in values.items() if not math.isfinite(value)]
