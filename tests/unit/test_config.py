@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import torch
 import yaml
+from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
 
 from stereo_occ.checkpoint import plain
@@ -23,6 +24,11 @@ OURS = [file for file in FILES if file.parts[0] != "hydra"]  # presets of Hydra'
 CHOICES = [(str(file.parent), file.name) for file in OURS if file.parent != Path()]
 MODELS = [option for group, option in CHOICES if group == "model"]
 SCALES = [option for group, option in CHOICES if group == "scale"]
+SWEEPS = {
+    file.stem: content["hydra"]["sweeper"]["params"]
+    for file in sorted((conf_dir() / "experiment").glob("*.yaml"))
+    if "hydra" in (content := yaml.safe_load(file.read_text()))
+}
 
 
 def defaults_of(file):
@@ -214,6 +220,18 @@ def test_twins_are_the_recipe_under_a_control(experiment, control):
     recipe, twin = (compose_config("train", [f"experiment={name}"]) for name in ("recipe", experiment))
     assert (twin.control.name, twin.control.degrees) == control
     assert plain(twin) == plain(recipe) | {"control": plain(twin)["control"]}
+
+
+@pytest.mark.parametrize("experiment", SWEEPS)
+def test_every_job_of_a_sweep(experiment):
+    lines = [f"{key}={values}" for key, values in SWEEPS[experiment].items()]
+    axes = [
+        [f"{sweep.get_key_element()}={value}" for value in sweep.sweep_string_iterator()]
+        for sweep in OverridesParser.create().parse_overrides(lines)
+    ]
+    jobs = [[f"experiment={experiment}", *job] for job in product(*axes)]
+    assert [problem for job in jobs for problem in problems("train", job)] == []
+    assert len({str(plain(compose_config("train", job))) for job in jobs}) == len(jobs) > 1
 
 
 def test_a_checkpoint_from_before_the_training_aids_is_one_without():
