@@ -17,6 +17,7 @@ from stereo_occ.data.rigs import RigConfig, ToedInRigConfig, build_rig
 from stereo_occ.data.scene import draw_scene
 from stereo_occ.data.splits import SUBSETS, split_views, subset_sizes
 from stereo_occ.errors import UserError
+from stereo_occ.loggers.config import LoggerConfig, logger_problems
 from stereo_occ.models.build import build_model
 from stereo_occ.optimization import OPTIMIZERS, SCHEDULES
 from stereo_occ.packaged import find_weights
@@ -49,6 +50,7 @@ def check_training(cfg: DictConfig) -> list[str]:
         *_control(cfg),
         *_aids(cfg),
         *_settings(cfg),
+        *_logger(cfg),
         *_hardware(cfg),
     ]
 
@@ -243,6 +245,12 @@ def _settings(cfg: DictConfig) -> Iterator[str]:
     betas = list(cfg.optimizer.betas)
     if len(betas) != 2 or not all(0 <= beta < 1 for beta in betas):
         yield f"optimizer.betas={betas}: must be two numbers in [0, 1)"
+
+
+def _logger(cfg: DictConfig) -> Iterator[str]:
+    config = OmegaConf.to_object(cfg.logger)
+    assert isinstance(config, LoggerConfig)
+    yield from logger_problems(config)
 
 
 def _hardware(cfg: DictConfig) -> Iterator[str]:

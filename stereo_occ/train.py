@@ -1,6 +1,7 @@
 """``python -m stereo_occ.train``: render what is missing, train, validate, write the run folder."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import lightning
@@ -16,11 +17,13 @@ from stereo_occ.checks import check_training
 from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
 from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.loggers.board import Board
+from stereo_occ.loggers.build import build_boards
+from stereo_occ.loggers.show import Show
 from stereo_occ.memory import keep_freed_memory
 from stereo_occ.metrics_file import WriteMetrics
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.resume import AtomicCheckpoints, SaveLatest, step_to_resume
-from stereo_occ.tensorboard import ShowInTensorBoard, StepLogger
 
 
 def train(cfg: DictConfig, folder: Path) -> lightning.Trainer:
@@ -40,7 +43,9 @@ def train(cfg: DictConfig, folder: Path) -> lightning.Trainer:
     (folder / "config.yaml").write_text(OmegaConf.to_yaml(cfg, resolve=True))
     data = build_data(typed)
     data.prepare_data()
-    trainer = build_trainer(typed, folder, build_callbacks(cfg, typed, folder), step)
+    boards = build_boards(typed.logger, folder, step)
+    callbacks = build_callbacks(cfg, typed, folder, boards)
+    trainer = build_trainer(typed, folder, callbacks, boards)
     try:
         trainer.fit(task, data, ckpt_path=latest if resume else None, weights_only=True)
     except (
@@ -77,7 +82,9 @@ def build_data(typed: TrainConfig) -> PairsDataModule:
     return data
 
 
-def build_callbacks(cfg: DictConfig, typed: TrainConfig, folder: Path) -> list[Callback]:
+def build_callbacks(
+    cfg: DictConfig, typed: TrainConfig, folder: Path, boards: Sequence[Board]
+) -> list[Callback]:
     """Checkpoints (best and latest), metrics file, pictures, progress bar."""
     validation = typed.validation
     callbacks: list[Callback] = [
@@ -103,9 +110,9 @@ def build_callbacks(cfg: DictConfig, typed: TrainConfig, folder: Path) -> list[C
                 auto_insert_metric_name=False,
             )
         )
-    if typed.logger.tensorboard:
+    if boards:
         callbacks += [
-            ShowInTensorBoard(typed.logger, plain(cfg)),
+            Show(typed.logger, boards, plain(cfg)),
             LearningRateMonitor(logging_interval="step"),
         ]
     if typed.progress:
@@ -114,13 +121,9 @@ def build_callbacks(cfg: DictConfig, typed: TrainConfig, folder: Path) -> list[C
 
 
 def build_trainer(
-    typed: TrainConfig, folder: Path, callbacks: list[Callback], step: int
+    typed: TrainConfig, folder: Path, callbacks: list[Callback], boards: Sequence[Board]
 ) -> lightning.Trainer:
-    """A trainer of exactly ``steps`` optimiser steps that validates every ``validation.interval`` of them.
-
-    Args:
-        step: that the run continues from; TensorBoard forgets what an earlier part has logged after it.
-    """
+    """A trainer of exactly ``steps`` optimiser steps that validates every ``validation.interval`` of them."""
     return lightning.Trainer(
         accelerator=typed.trainer.accelerator,
         devices=typed.trainer.devices,
@@ -132,9 +135,7 @@ def build_trainer(
         num_sanity_val_steps=0,
         gradient_clip_val=typed.trainer.gradient_clip,
         log_every_n_steps=min(typed.logger.interval, typed.steps),
-        logger=StepLogger(folder, name="", version="tensorboard", purge_step=step + 1)
-        if typed.logger.tensorboard
-        else False,
+        logger=list(boards),
         callbacks=callbacks,
         plugins=AtomicCheckpoints(),
         enable_progress_bar=typed.progress,

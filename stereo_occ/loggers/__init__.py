@@ -1,0 +1,1 @@
+"""Where a training writes what it sees: TensorBoard, a CSV file, Weights & Biases, MLflow."""
