@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,15 +60,36 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         }
         return _checked(checkpoint, path)
     try:
+        if not _is_as_written(path):
+            raise UserError(
+                f"checkpoint={path}: is damaged, its content differs from its checksums; copy it again, or give "
+                f"another checkpoint of the run"
+            )
         checkpoint = torch.load(path, map_location="cpu", weights_only=True)
-    except (FileNotFoundError, PermissionError, IsADirectoryError) as error:
+    except OSError as error:
         raise UserError(f"checkpoint={path}: cannot be read ({error.strerror or error})") from error
+    except UserError:
+        raise
     except Exception as error:  # torch's own message advises to execute what the file holds
         raise UserError(
             f"checkpoint={path}: is damaged, or holds more than tensors and plain values; "
             f"give the best.ckpt or last.ckpt of a training run"
         ) from error
     return _checked(checkpoint, path)
+
+
+def _is_as_written(path: Path) -> bool:
+    """Whether all that torch will read agrees with the checksums that it has written but does not read.
+
+    Raises:
+        Exception: the file is not what ``torch.save`` writes.
+    """
+    with zipfile.ZipFile(path) as archive:
+        if any(record.compress_type != zipfile.ZIP_STORED for record in archive.infolist()):
+            raise zipfile.BadZipFile(
+                "torch compresses nothing"
+            )  # and a small file could stand for a huge one
+        return archive.testzip() is None
 
 
 def _checked(checkpoint: Any, path: Path) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -20,6 +20,8 @@ from stereo_occ.config import register_schemas
 from stereo_occ.errors import UserError
 from stereo_occ.paths import conf_dir
 from stereo_occ.problems import Check, find_problems
+from stereo_occ.run_folder import remove_traces
+from stereo_occ.system_errors import refusal
 
 # With these Hydra shows something and runs no job.
 ONLY_SHOWS = ("help", "hydra_help", "cfg", "info", "shell_completion")
@@ -40,8 +42,9 @@ def entry_point(
     """Turn ``task(cfg)`` into a command line program configured by ``conf/<config_name>.yaml``.
 
     Every problem of the configuration ends the program before it starts, with one line each on standard error and
-    exit code 2. So does a :class:`UserError` of the task; of a sweep the other jobs still run, in this process or where
-    a launcher runs them.
+    exit code 2. So does a :class:`UserError` of the task, or what the system refuses it, such as space on a full disk;
+    a run folder that it has left nothing in is removed. Of a sweep the other jobs still run, in this process or where a
+    launcher runs them.
 
     Args:
         aliases: other names of keys, for those that have the name of a group.
@@ -55,11 +58,14 @@ def entry_point(
             register_schemas()  # a launcher's process does not know them yet
             try:
                 task(cfg)
-            except UserError as error:
+            except Exception as error:
+                problem = _problem(error)
+                hydra_cfg = HydraConfig.get()
+                remove_traces(Path(hydra_cfg.runtime.output_dir), hydra_cfg.job.name)
                 if _runs_elsewhere():
-                    raise  # Hydra brings it back to the process of the sweep
-                failures.append(str(error))
-                _report([str(error)])
+                    raise UserError(problem) from error  # Hydra brings it back to the process of the sweep
+                failures.append(problem)
+                _report([problem])
 
         register_schemas()
         run_hydra = hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=config_name)(
@@ -69,23 +75,23 @@ def entry_point(
         def main() -> None:
             sys.argv[1:] = [_by_key(argument, aliases or {}) for argument in sys.argv[1:]]
             arguments = get_args_parser().parse_args()
-            if not any(getattr(arguments, name) for name in ONLY_SHOWS):
-                problems = _missing_launchers(arguments.overrides) or find_problems(
-                    arguments.config_name or config_name,
-                    arguments.overrides,
-                    check,
-                    multirun=arguments.multirun,
-                    config_dir=Path(arguments.config_dir) if arguments.config_dir else None,
-                )
-                if problems:
-                    _report([_by_alias(problem, aliases or {}) for problem in problems])
-                    raise SystemExit(2)
             try:
-                with _errors_raised() if arguments.multirun else nullcontext():
+                if not any(getattr(arguments, name) for name in ONLY_SHOWS):
+                    problems = _missing_launchers(arguments.overrides) or find_problems(
+                        arguments.config_name or config_name,
+                        arguments.overrides,
+                        check,
+                        multirun=arguments.multirun,
+                        config_dir=Path(arguments.config_dir) if arguments.config_dir else None,
+                    )
+                    if problems:
+                        _report([_by_alias(problem, aliases or {}) for problem in problems])
+                        raise SystemExit(2)
+                with _errors_raised():
                     run_hydra()
-            except UserError as error:
-                failures.append(str(error))
-                _report([str(error)])
+            except Exception as error:
+                failures.append(_problem(error))
+                _report(failures[-1:])
             if failures:
                 raise SystemExit(2)
 
@@ -106,6 +112,14 @@ def compose_config(config_name: str, overrides: Sequence[str] = ()) -> DictConfi
     if problems:
         raise UserError("; ".join(problems))
     return composed[0]
+
+
+def _problem(error: Exception) -> str:
+    """The one line on a mistake of the user's or a refusal of the system's; any other error is raised again."""
+    problem = str(error) if isinstance(error, UserError) else refusal(error)
+    if problem is None:
+        raise error
+    return problem
 
 
 def _by_key(argument: str, aliases: Mapping[str, str]) -> str:
@@ -135,7 +149,7 @@ def _missing_launchers(overrides: Sequence[str]) -> list[str]:
 
 @contextmanager
 def _errors_raised() -> Iterator[None]:
-    """Let Hydra raise what went wrong in a sweep, where it would print it and exit."""
+    """Let Hydra raise what went wrong, where it would print it and exit."""
     before = os.environ.get("HYDRA_FULL_ERROR")
     os.environ["HYDRA_FULL_ERROR"] = "1"
     try:

@@ -76,7 +76,10 @@ def step_to_resume(checkpoint: Path, config: dict[str, Any]) -> int:
     Raises:
         UserError: it is damaged, or of a run with other settings.
     """
-    saved = read_checkpoint(checkpoint)
+    try:
+        saved = read_checkpoint(checkpoint)
+    except UserError as error:
+        raise UserError(f"{error}; or copy best.ckpt over it, or say resume=never to start over") from error
     former = plain(training_config(saved[KEY]["config"]))
     changed = [name for name in FIXED if former[name] != config[name]]
     if changed:

@@ -61,8 +61,14 @@ def load_trained(name: str) -> TrainedModel:
     try:
         model.load_state_dict({key[6:]: value for key, value in state.items() if key.startswith("model.")})
         threshold = float(state["threshold"])
-    except (RuntimeError, KeyError) as error:
+        step = int(checkpoint["global_step"] or 0)
+    except (RuntimeError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise UserError(
             f"checkpoint={name}: its weights do not fit its configuration; it was written by another version"
         ) from error
-    return TrainedModel(model.eval(), typed, threshold, int(checkpoint["global_step"] or 0), name)
+    numbers = [tensor for tensor in model.state_dict().values() if tensor.is_floating_point()]
+    if not (0 < threshold < 1 and all(bool(tensor.isfinite().all()) for tensor in numbers)):
+        raise UserError(
+            f"checkpoint={name}: holds NaN or infinite numbers, so its training has diverged; use one of before"
+        )
+    return TrainedModel(model.eval(), typed, threshold, step, name)

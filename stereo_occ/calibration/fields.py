@@ -1,6 +1,8 @@
 """Numbers and matrices in the text of calibration files: OpenCV's FileStorage, ROS and plain YAML or JSON."""
 
-from collections.abc import Mapping
+import reprlib
+from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,12 @@ import yaml
 from numpy.typing import NDArray
 
 from stereo_occ.errors import UserError
+
+#: Calibrations have a few kilobytes.
+MOST_BYTES = 1_000_000
+
+#: The longest array has 14 numbers. References in a file of a few lines can stand for billions.
+MOST_NUMBERS = 1000
 
 
 class _Loader(yaml.SafeLoader):
@@ -41,6 +49,10 @@ class Fields:
     def read(cls, path: Path) -> "Fields":
         """Of a file."""
         try:
+            if (size := path.stat().st_size) > MOST_BYTES:
+                raise UserError(
+                    f"rig={path}: has {size / 1e6:.1f} MB, so it is no calibration; give its YAML or JSON"
+                )
             text = path.read_text(encoding="utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "not text"
@@ -49,7 +61,7 @@ class Fields:
         text = "\n".join(line for line in text.splitlines() if not line.startswith("%YAML"))
         try:
             values = yaml.load(text, _Loader)
-        except yaml.YAMLError as error:
+        except (yaml.YAMLError, RecursionError, ValueError) as error:  # ValueError: of dates and numbers
             mark = getattr(error, "problem_mark", None)
             where = f", line {mark.line + 1}" if mark else ""
             raise UserError(f"rig={path}: is neither YAML nor JSON{where}") from error
@@ -68,8 +80,8 @@ class Fields:
         """The keys below one."""
         value = self.values.get(key)
         if not isinstance(value, dict):
-            raise UserError(f"rig={self.source}: {key} must hold keys of its own, got {value}")
-        return Fields(value, f"{self.source}: {key}")
+            raise UserError(f"rig={self.source}: {key} must hold keys of its own, got {brief(value)}")
+        return Fields({str(name): part for name, part in value.items()}, f"{self.source}: {key}")
 
     def text(self, key: str, default: str) -> str:
         """A word."""
@@ -84,11 +96,13 @@ class Fields:
         if isinstance(value, dict) and "data" in value:
             value = value["data"]
         try:
+            if len(list(islice(_leaves(value), MOST_NUMBERS + 1))) > MOST_NUMBERS:
+                raise ValueError
             numbers = np.asarray(value, dtype=object).astype(np.float64)
             return numbers if shape is None else numbers.reshape(shape)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, RecursionError) as error:
             wanted = f"{' x '.join(map(str, shape))} numbers" if shape else "numbers"
-            raise UserError(f"rig={self.source}: {key} must be {wanted}, got {str(value)[:80]}") from error
+            raise UserError(f"rig={self.source}: {key} must be {wanted}, got {brief(value)}") from error
 
     def size(self) -> tuple[int, int] | None:
         """Width and height of the images, where they are given."""
@@ -99,6 +113,24 @@ class Fields:
             height = self.array("image_height", "height", shape=())
         else:
             return None
-        if not (width >= 1 and height >= 1):
-            raise UserError(f"rig={self.source}: image size must be positive, got {width:g} x {height:g}")
+        if not (1 <= width < np.inf and 1 <= height < np.inf):
+            raise UserError(
+                f"rig={self.source}: image size must be positive numbers of pixels, got {width:g} x {height:g}"
+            )
         return int(width), int(height)
+
+
+def brief(value: Any) -> str:
+    """A value for a message, cut short."""
+    shortener = reprlib.Repr()
+    shortener.maxlevel, shortener.maxlist = 2, 4
+    return shortener.repr(value)[:80]
+
+
+def _leaves(value: Any) -> Iterator[Any]:
+    """What nested lists hold."""
+    if not isinstance(value, list):
+        yield value
+        return
+    for part in value:
+        yield from _leaves(part)

@@ -7,6 +7,7 @@ from stereo_occ.calibration.fields import Fields
 from stereo_occ.calibration.lens import Lens
 from stereo_occ.calibration.pair import RealCamera, RealPair
 from stereo_occ.errors import UserError
+from stereo_occ.geometry.camera import check_rigid
 
 #: Names that are in use for the matrices of ``cv2.stereoCalibrate``, left camera's 1 and right camera's 2.
 INTRINSICS = ("K{}", "M{}", "cameraMatrix{}", "camera_matrix_{}", "camera_matrix{}", "mtx{}")
@@ -61,6 +62,7 @@ def from_ros(left: Fields, right: Fields, metres: float, rectified: bool) -> Rea
         return _from_projections(projections[0], projections[1], (left.size(), right.size()), metres)
     poses = []
     for fields, P_34 in zip((left, right), projections, strict=True):
+        _check_projection(P_34, f"rig={fields.source}: projection_matrix")
         pose = np.eye(4)
         pose[:3, :3] = fields.array("rectification_matrix", "R", "r", shape=(3, 3))
         pose[0, 3] = metres * P_34[0, 3] / P_34[0, 0]
@@ -122,16 +124,28 @@ def _from_projections(
 ) -> RealPair:
     """Rectified images: P is ``K [I | t]``."""
     parts = []
-    for P_34, size in zip((P1_34, P2_34), sizes, strict=True):
+    for name, P_34, size in zip(("left", "right"), (P1_34, P2_34), sizes, strict=True):
+        _check_projection(P_34, f"rig: the projection of the {name} camera")
         pose = np.eye(4)
         pose[:3, 3] = metres * np.linalg.solve(P_34[:, :3], P_34[:, 3])
         parts.append((P_34[:, :3], IDEAL, pose, size))
     return _relative_to_left(parts)
 
 
+def _check_projection(P_34: NDArray[np.float64], name: str) -> None:
+    if not (
+        np.isfinite(P_34).all() and P_34[0, 0] > 0 and P_34[1, 1] > 0 and P_34[2].tolist() == [0, 0, 1, 0]
+    ):
+        raise UserError(
+            f"{name} must be [[fx, 0, cx, Tx], [0, fy, cy, Ty], [0, 0, 1, 0]] with positive focal lengths, "
+            f"got {P_34.tolist()}"
+        )
+
+
 def _relative_to_left(
     parts: list[tuple[NDArray[np.float64], Lens, NDArray[np.float64], tuple[int, int] | None]],
 ) -> RealPair:
+    check_rigid(parts[0][2], "rig: the pose of the left camera")
     rig_from_left = np.linalg.inv(parts[0][2])
     left, right = (RealCamera(K, lens, pose @ rig_from_left, size) for K, lens, pose, size in parts)
     return RealPair(left, right)

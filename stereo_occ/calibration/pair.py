@@ -12,6 +12,9 @@ from stereo_occ.geometry.camera import Camera, StereoRig, check_rigid
 #: Baselines that a pair of cameras for household objects may have, metres.
 BASELINES = (0.005, 3.0)
 
+#: Between the optical axes, degrees: more than this sees no household object from both sides.
+MOST_APART = 90.0
+
 #: Widths and heights of an image may differ by this share from the calibration's, as a rounded division does.
 SAME_SHAPE = 0.01
 
@@ -64,14 +67,21 @@ class RealCamera:
         Raises:
             UserError: if they are of another shape, or the principal point says that the size is not theirs.
         """
-        if self.size is None:
-            center = self.K[:2, 2] / [width - 1, height - 1]
-            if not ((center > 0.25) & (center < 0.75)).all():
+        low, high = (
+            (0.25, 0.75) if self.size is None else (-0.5, 1.5)
+        )  # a part of an image may have it outside
+        center_2 = (self.K[:2, 2] + 0.5) / (self.size or (width, height))
+        if not ((center_2 > low) & (center_2 < high)).all():
+            where = f"the principal point of the {name} camera is at ({self.K[0, 2]:.0f}, {self.K[1, 2]:.0f})"
+            if self.size is not None:
                 raise UserError(
-                    f"rig: the principal point of the {name} camera is at "
-                    f"({self.K[0, 2]:.0f}, {self.K[1, 2]:.0f}), but its image has {width} x {height} pixels; "
-                    f"if it was calibrated at another size, add image_width and image_height to the file"
+                    f"rig: {where}, far out of its images of {self.size[0]} x {self.size[1]} pixels; check K"
                 )
+            raise UserError(
+                f"rig: {where}, but its image has {width} x {height} pixels; "
+                f"if it was calibrated at another size, add image_width and image_height to the file"
+            )
+        if self.size is None:
             return replace(self, size=(width, height))
         scale_2 = np.array([width, height]) / self.size
         if abs(scale_2[0] / scale_2[1] - 1) > SAME_SHAPE:
@@ -98,13 +108,14 @@ class RealPair:
 
     def __post_init__(self) -> None:
         for name, camera in (("left", self.left), ("right", self.right)):
-            K = camera.K
-            if K.shape != (3, 3) or not np.isfinite(K).all() or not (K[0, 0] > 0 and K[1, 1] > 0):
-                raise UserError(
-                    f"rig: K of the {name} camera must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with positive "
-                    f"focal lengths, got {K.tolist()}"
-                )
+            _check_intrinsics(camera.K, name)
             check_rigid(camera.camera_from_left, f"rig: R and T of the {name} camera")
+        angle = np.degrees(np.arccos(np.clip(self.left.rotation_33[2] @ self.right.rotation_33[2], -1, 1)))
+        if angle > MOST_APART:
+            raise UserError(
+                f"rig: the cameras look {angle:.0f} degrees apart, expected at most {MOST_APART:.0f}; "
+                f"check R: it must turn the left camera's axes to the right one's"
+            )
         baseline = self.baseline
         if not BASELINES[0] <= baseline <= BASELINES[1]:
             hint = "millimetres? add unit=mm" if baseline > BASELINES[1] else "another unit? set unit="
@@ -177,6 +188,17 @@ class RealPair:
             pose[:3, :3], pose[:3, 3] = R_33, -R_33 @ camera.center_3
             cameras.append(Camera(K, pose, width, height))
         return StereoRig(*cameras)
+
+
+def _check_intrinsics(K: NDArray[np.float64], name: str) -> None:
+    sound = K.shape == (3, 3) and bool(np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0)
+    if sound and np.array_equal(K[2], [0, 0, 1]):
+        return
+    hint = "; is it transposed?" if sound and np.array_equal(K[:, 2], [0, 0, 1]) else ""
+    raise UserError(
+        f"rig: K of the {name} camera must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with positive focal lengths, "
+        f"got {K.tolist()}{hint}"
+    )
 
 
 def _size(camera: RealCamera) -> tuple[int, int]:

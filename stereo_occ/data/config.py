@@ -49,6 +49,7 @@ class MeshFilesConfig(DataConfig):
     root: str = MISSING
     colors: bool = True  # read the files' own colours and textures
     time_limit: float = 120.0  # seconds for reading and repairing one mesh
+    memory_limit: float = 4.0  # GB for that
 
 
 @dataclass
@@ -71,4 +72,4 @@ DATA_SCHEMAS: dict[str, type[DataConfig]] = {
 }
 
 #: How a data set is found and read changes which objects there are, not what a shard holds.
-NOT_CONTENT = ("counts", "split", "fractions", "table", "colors", "time_limit")
+NOT_CONTENT = ("counts", "split", "fractions", "table", "colors", "time_limit", "memory_limit")

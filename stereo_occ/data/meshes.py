@@ -10,7 +10,7 @@ from pathlib import Path
 from pebble import ProcessExpired, ProcessPool
 from tqdm import tqdm
 
-from stereo_occ.data.processes import start_worker
+from stereo_occ.data.processes import start_bounded_worker
 from stereo_occ.errors import UserError
 from stereo_occ.shapes.inspection import Inspection
 from stereo_occ.shapes.layouts import MeshFile
@@ -50,14 +50,22 @@ class MeshRecord:
 
 
 def inspect_files(
-    files: Sequence[MeshFile], cache: MeshCache, workers: int, time_limit: float, progress: bool
+    files: Sequence[MeshFile],
+    cache: MeshCache,
+    workers: int,
+    time_limit: float,
+    memory_limit: float,
+    progress: bool,
 ) -> list[MeshRecord]:
-    """Inspect files that are not in the cache, each for at most ``time_limit`` seconds; a record for each file.
+    """Inspect files that are not in the cache, each within limits; a record for each file.
 
-    A file whose process hangs, crashes or is killed is rejected with that reason, and tried again the next time.
+    A file whose process hangs, crashes, is killed or wants too much memory is rejected with that reason, and tried
+    again the next time.
 
     Args:
         workers: processes; 0: one per core.
+        time_limit: seconds for one file.
+        memory_limit: GB for one file.
 
     Raises:
         UserError: the cache cannot be written.
@@ -71,14 +79,16 @@ def inspect_files(
         context = multiprocessing.get_context("spawn")
         with (
             tqdm(total=len(missing), desc="reading meshes", unit="mesh", disable=not progress) as bar,
-            ProcessPool(count, initializer=start_worker, context=context) as pool,
+            ProcessPool(
+                count, initializer=start_bounded_worker, initargs=[memory_limit], context=context
+            ) as pool,
         ):
             jobs: dict[Future[Path], Path] = {
                 pool.schedule(cache.make, args=(path,), timeout=time_limit): path for path in missing
             }
             try:
                 for job in as_completed(jobs):
-                    entries[jobs[job]], failures[jobs[job]] = _result(job, time_limit)
+                    entries[jobs[job]], failures[jobs[job]] = _result(job, time_limit, memory_limit)
                     bar.update()
             except BaseException:
                 pool.stop()
@@ -104,7 +114,7 @@ def _record(file: MeshFile, entry: Path | None, failure: str) -> MeshRecord:
     return MeshRecord(file, load(entry, header_only=True), entry)
 
 
-def _result(job: Future[Path], time_limit: float) -> tuple[Path | None, str]:
+def _result(job: Future[Path], time_limit: float, memory_limit: float) -> tuple[Path | None, str]:
     """The entry of a finished job, or why there is none."""
     try:
         return job.result(), ""
@@ -112,6 +122,8 @@ def _result(job: Future[Path], time_limit: float) -> tuple[Path | None, str]:
         raise
     except TimeoutError:
         return None, f"took longer than data.time_limit={time_limit:g} seconds"
+    except MemoryError:
+        return None, f"needs more memory than data.memory_limit={memory_limit:g} GB"
     except ProcessExpired as error:
         return None, f"the process that read it ended with code {error.exitcode}, perhaps for want of memory"
     except Exception as error:  # whatever a mesh does to the libraries, the others are to be read

@@ -80,7 +80,11 @@ def list_objects(pairs: PairsConfig, progress: bool) -> Objects:
     listing = _listing(data)
     files = [file for file in listing.files if file.category in categories]
     cache = MeshCache(Path(pairs.paths.data) / "mesh_cache", Path(data.root), data.colors)
-    records = list(without_copies(inspect_files(files, cache, pairs.workers, data.time_limit, progress)))
+    records = list(
+        without_copies(
+            inspect_files(files, cache, pairs.workers, data.time_limit, data.memory_limit, progress)
+        )
+    )
     skipped = listing.skipped + [
         Skipped(record.file.path, record.file.object_id, record.file.category, record.outcome.reason)
         for record in records

@@ -20,7 +20,8 @@ path                                    shape, type         meaning
 ======================================  ==================  ========================================================
 
 Every data set carries a Fletcher-32 checksum and the file's own structure is checksummed by HDF5's latest format, so
-damage is an error and not a wrong number. A shard appears under its name only when it is whole. Beside it lies the
+damage is an error and not a wrong number. What a shard holds is in the shard: links and arrays that lead to other files
+are refused, and names that are no plain names. A shard appears under its name only when it is whole. Beside it lies the
 SHA-256 of the whole file (:func:`checksum_path`), as ``sha256sum`` writes it.
 """
 
@@ -37,13 +38,13 @@ from numpy.typing import NDArray
 from trimesh import Trimesh
 
 from stereo_occ.data.open_shards import forget, use
+from stereo_occ.data.shard_arrays import DAMAGED, array_of
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.pose import Pose
 from stereo_occ.occupancy.pools import PointPool
 
 FORMAT = "stereo_occ.shard"
 VERSION = 1
-POOLS = ("box", "surface")
 
 #: Of more views than this the cameras and poses are read one by one: those of a thousand take a tenth of a second.
 ROWS_AT_ONCE = 128
@@ -82,7 +83,7 @@ class Shard:
         try:
             file = h5py.File(self.path, "r", rdcc_nbytes=0)
             form, version = _text(file.attrs.get("format")), file.attrs.get("version")
-        except (OSError, RuntimeError) as error:
+        except DAMAGED as error:
             raise self._damaged(error) from error
         if form != FORMAT or version != VERSION:
             raise UserError(
@@ -102,22 +103,29 @@ class Shard:
         use(self)
         try:
             if name not in self._opened:  # opening a data set takes longer than reading one view
-                self._opened[name] = self._file[name]
-        except (OSError, KeyError, RuntimeError) as error:
+                self._opened[name] = array_of(self._file, name)
+        except DAMAGED as error:
             raise self._damaged(error) from error
         return self._opened[name]
 
     def _read(self, name: str, selection: Any = ...) -> NDArray[Any]:
         try:
             return np.asarray(self._dataset(name)[selection])
-        except (OSError, RuntimeError) as error:
+        except DAMAGED as error:
             raise self._damaged(error) from error
 
     def _text(self, name: str) -> str:
         try:
             return _text(self._file.attrs[name])
-        except (OSError, KeyError, RuntimeError) as error:
+        except DAMAGED as error:
             raise self._damaged(error) from error
+
+    def _name(self, attribute: str) -> str:
+        """A text that becomes part of file names."""
+        name = self._text(attribute)
+        if not name or name.startswith(".") or "/" in name or "\\" in name or not name.isprintable():
+            raise self._damaged(ValueError(f"{attribute} {name!r} is no plain name"))
+        return name
 
     def __len__(self) -> int:
         return len(self._dataset("views/rgb"))
@@ -141,17 +149,20 @@ class Shard:
     @cached_property
     def category(self) -> str:
         """The object's category."""
-        return self._text("category")
+        return self._name("category")
 
     @cached_property
     def object_id(self) -> str:
         """The object's name, unique within its data set."""
-        return self._text("object_id")
+        return self._name("object_id")
 
     @property
     def facts(self) -> dict[str, Any]:
         """Plain figures about the object."""
-        return dict(json.loads(self._text("facts")))
+        try:
+            return dict(json.loads(self._text("facts")))
+        except (ValueError, TypeError) as error:
+            raise self._damaged(error) from error
 
     @property
     def mesh(self) -> Trimesh:
@@ -216,9 +227,9 @@ class Shard:
         try:
             self._file.visit(names.append)
             for name in names:
-                if isinstance(node := self._file[name], h5py.Dataset):
-                    node[...]
-        except (OSError, KeyError, RuntimeError) as error:
+                if isinstance(self._file[name], h5py.Dataset):
+                    array_of(self._file, name)[...]
+        except DAMAGED as error:
             raise self._damaged(error) from error
 
 

@@ -1,5 +1,6 @@
 """Photographs: reading any image file, and what another camera at the same place would have taken."""
 
+import warnings
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
@@ -15,6 +16,9 @@ from stereo_occ.geometry.camera import Camera
 
 #: Largest values of the grey levels that cameras deliver in 16 bits.
 DEPTHS = tuple(2**bits - 1 for bits in (8, 10, 12, 14, 16))
+
+#: Images of more pixels are not read: they would need gigabytes.
+MOST_PIXELS = 150_000_000
 
 #: Transparency above this is object.
 OPAQUE = 128
@@ -146,13 +150,23 @@ def _to_bytes(values_HW: NDArray[np.generic]) -> NDArray[np.uint8]:
 
 def _open(path: Path, name: str) -> Image.Image:
     try:
-        with Image.open(path) as image:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit is ours
+            image = Image.open(path)
+        with image:
+            if image.width * image.height > MOST_PIXELS:
+                raise Image.DecompressionBombError
             image.load()
             return ImageOps.exif_transpose(image)
     except FileNotFoundError as error:
         raise UserError(f"{name}={path}: no such file") from error
     except UnidentifiedImageError as error:
         raise UserError(f"{name}={path}: is no image; give PNG, JPEG, TIFF, BMP, WebP or PGM") from error
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+    except Image.DecompressionBombError as error:
+        raise UserError(
+            f"{name}={path}: has more than {MOST_PIXELS / 1e6:.0f} million pixels; scale it down, the calibration is "
+            f"scaled with it"
+        ) from error
+    except (OSError, SyntaxError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise UserError(f"{name}={path}: cannot be read ({reason})") from error

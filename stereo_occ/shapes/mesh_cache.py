@@ -20,7 +20,7 @@ from trimesh import Trimesh
 
 from stereo_occ.errors import UserError
 from stereo_occ.shapes.inspection import Inspection, inspect_mesh
-from stereo_occ.shapes.reading import digest, read_below
+from stereo_occ.shapes.reading import digest, fault_of, read_below
 from stereo_occ.writing import whole_file
 
 #: What reading an entry raises that is not there or not whole.
@@ -67,9 +67,10 @@ class MeshCache:
     def _entry(self, path: Path) -> Path:
         key = hashlib.sha256(f"{_code()} {path.suffix.lower()} {self.colors} ".encode())
         try:
-            key.update(path.read_bytes())
+            content = b"" if fault_of(path) else path.read_bytes()
         except OSError:
-            key.update(str(path).encode(errors="surrogateescape"))
+            content = b""
+        key.update(content or str(path).encode(errors="surrogateescape"))
         return self.folder / f"{key.hexdigest()[:32]}.npz"
 
 

@@ -3,6 +3,7 @@
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+from stat import S_ISREG
 
 import numpy as np
 import trimesh
@@ -11,6 +12,13 @@ from trimesh.resolvers import FilePathResolver
 
 from stereo_occ.errors import UserError
 from stereo_occ.shapes.surface_colors import SurfaceColors, surface_colors
+
+#: Larger files, and those of more triangles, are not read; scans of household objects have a hundredth of that.
+MOST_BYTES = 1_000_000_000
+MOST_TRIANGLES = 5_000_000
+
+#: Longest side of the bounding box, in the file's own unit.
+SIZES = (1e-4, 1e7)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +64,27 @@ class SideFiles(FilePathResolver):
 
 
 def read_below(path: Path, root: Path) -> bytes | None:
-    """The content of a file, None where there is none below ``root``."""
+    """The content of a file, None where there is none below ``root``, or one that :func:`fault_of` something is."""
     try:
         resolved = path.resolve()
-        return resolved.read_bytes() if resolved.is_relative_to(root.resolve()) else None
+        readable = resolved.is_relative_to(root.resolve()) and not fault_of(resolved)
+        return resolved.read_bytes() if readable else None
     except (OSError, ValueError):  # ValueError: a name that no file can have
         return None
+
+
+def fault_of(path: Path) -> str:
+    """Why a file is not even to be opened, empty if it is: a pipe would be waited for, a device never ends.
+
+    Raises:
+        OSError: there is no such file.
+    """
+    status = path.stat()
+    if not S_ISREG(status.st_mode):
+        return "is no regular file"
+    if status.st_size > MOST_BYTES:
+        return f"has {status.st_size / 1e9:.1f} GB, at most {MOST_BYTES / 1e9:g} are read; simplify it"
+    return ""
 
 
 def digest(content: bytes | None) -> str:
@@ -81,6 +104,8 @@ def read_mesh(path: Path, root: Path, colors: bool) -> RawMesh:
     if file_type not in trimesh.available_formats():
         raise UserError(f"reading {path.suffix} files needs pycollada: pip install 'pycollada>=0.8'")
     try:
+        if reason := fault_of(path):
+            raise UserError(reason)
         return _read(path, root, colors)
     except (UserError, MemoryError):
         raise
@@ -98,6 +123,10 @@ def _read(path: Path, root: Path, colors: bool) -> RawMesh:
     parts = [part for part in scene.dump() if isinstance(part, Trimesh) and len(part.faces)]
     if not parts:
         raise UserError("holds no triangles")
+    if (triangles := sum(len(part.faces) for part in parts)) > MOST_TRIANGLES:
+        raise UserError(
+            f"has {triangles / 1e6:.1f} million triangles, at most {MOST_TRIANGLES / 1e6:g} are read; simplify it"
+        )
     offsets = np.cumsum([0, *(len(part.vertices) for part in parts)])
     mesh = Trimesh(
         np.concatenate([part.vertices for part in parts]),
@@ -106,5 +135,7 @@ def _read(path: Path, root: Path, colors: bool) -> RawMesh:
     )
     if not np.isfinite(mesh.vertices).all():
         raise UserError("has vertices that are not finite numbers")
+    if not SIZES[0] <= (side := float(np.ptp(mesh.vertices, axis=0).max())) <= SIZES[1]:
+        raise UserError(f"is {side:g} units large, expected {SIZES[0]:g} to {SIZES[1]:g}; scale it")
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     return RawMesh(mesh, surface_colors(parts) if colors else None, dict(side_files.seen))

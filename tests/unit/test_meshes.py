@@ -37,7 +37,7 @@ def inspect(root, *names, time_limit=60.0, workers=2):
     files = list_folder(root).files
     return {
         record.file.object_id: record
-        for record in inspect_files(files, cache, workers, time_limit, progress=False)
+        for record in inspect_files(files, cache, workers, time_limit, 4.0, progress=False)
     }
 
 
@@ -75,7 +75,7 @@ def test_of_copies_the_first_is_kept(tmp_path):
     put(box(1, 1, 3), tmp_path, "mug/other.stl")
     cache = MeshCache(tmp_path / "cache", tmp_path, colors=True)
     files = list_folder(tmp_path).files
-    records = list(without_copies(inspect_files(files, cache, 1, 60, progress=False)))
+    records = list(without_copies(inspect_files(files, cache, 1, 60, 4.0, progress=False)))
     assert {record.file.object_id: record.outcome.reason for record in records} == {
         "original": "", "copy": "is a copy of bowl/original", "other": ""
     }  # fmt: skip

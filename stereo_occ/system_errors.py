@@ -1,0 +1,38 @@
+"""What the system refuses a program, in one line each: full disks, folders without permission, want of memory."""
+
+import errno
+
+import torch
+
+#: What to do about each refusal that is not a mistake of this program.
+REMEDIES = {
+    errno.ENOSPC: "free some disk space",
+    errno.EDQUOT: "free some of your quota",
+    errno.EFBIG: "raise the limit on the size of files",
+    errno.EIO: "check the disk",
+    errno.EROFS: "choose another folder",
+    errno.EACCES: "choose another folder, or get permission",
+    errno.EPERM: "choose another folder, or get permission",
+    errno.ENAMETOOLONG: "choose a shorter name",
+    errno.ENOTDIR: "choose another folder",
+    errno.EEXIST: "choose another folder",
+    errno.EISDIR: "choose another name",
+    errno.EMFILE: "raise the limit on open files (ulimit -n)",
+    errno.ENFILE: "close other programs",
+}
+
+#: How torch begins what it raises where there is no memory.
+NO_MEMORY = ("[enforce fail at alloc_cpu", "CUDA out of memory", "DefaultCPUAllocator")
+
+
+def refusal(error: BaseException) -> str | None:
+    """One line on an error that the system has caused; None for any other."""
+    if isinstance(error, OSError) and error.errno in REMEDIES:
+        name = error.filename2 or error.filename
+        what = f"{name}: " if name is not None else "a file cannot be written: "
+        return f"{what}{error.strerror}; {REMEDIES[error.errno]}"
+    if isinstance(error, MemoryError | torch.OutOfMemoryError) or (
+        isinstance(error, RuntimeError) and any(begin in str(error)[:300] for begin in NO_MEMORY)
+    ):
+        return "not enough memory; ask for less (batch_size, views, workers), or close other programs"
+    return None
