@@ -43,14 +43,15 @@ def cube_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generat
     """``count`` points uniform in the working volume, with the labels of a box pool.
 
     Outside the object's posed box a point is empty. Points inside it are replaced by as many distinct points
-    of the pool, posed: they too are uniform in the box, and their labels are known.
+    of the pool, posed, that are in the volume: they too are uniform in what it has of the box, and their labels are
+    known.
 
     Raises:
-        UserError: if the pool has too few points, or the posed box leaves the working volume.
+        UserError: if the pool has too few points.
     """
     points_N3 = rng.uniform(-_HALF, _HALF, (count, 3))
-    inside_N = _in_box(points_N3, pool, pose)
-    drawn = _draw(pool, pose, int(inside_N.sum()), rng)
+    inside_N, whole = _in_box(points_N3, pool, pose)
+    drawn = (_draw if whole else _draw_within)(pool, pose, int(inside_N.sum()), rng)
     points_N3[inside_N] = drawn.points_N3
     occupied_N = np.zeros(count, dtype=bool)
     occupied_N[inside_N] = drawn.occupied_N
@@ -58,38 +59,45 @@ def cube_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generat
 
 
 def outside_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
-    """``count`` points uniform in the working volume without the box of a box pool, posed: all empty.
-
-    Raises:
-        UserError: if the posed box leaves the working volume.
-    """
+    """``count`` points uniform in the working volume without the box of a box pool, posed: all empty."""
     points_N3 = np.empty((0, 3))
     while len(points_N3) < count:  # a box with diagonal 1 fills at most a fifth of the cube
         candidates_M3 = rng.uniform(-_HALF, _HALF, (count, 3))
-        points_N3 = np.concatenate([points_N3, candidates_M3[~_in_box(candidates_M3, pool, pose)]])
+        inside_M, _ = _in_box(candidates_M3, pool, pose)
+        points_N3 = np.concatenate([points_N3, candidates_M3[~inside_M]])
     return LabelledPoints(points_N3[:count], np.zeros(count, dtype=bool))
 
 
 def _draw(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
     """``count`` distinct points of the pool, posed."""
-    if count > len(pool):
-        raise UserError(
-            f"query points: {count} asked from a pool of {len(pool)}; ask for fewer or prepare a larger pool"
-        )
-    index_M = rng.choice(len(pool), count, replace=False)
+    _check_count(count, len(pool))
+    return _posed(pool, pose, rng.choice(len(pool), count, replace=False))
+
+
+def _draw_within(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
+    """The same of those that are in the working volume."""
+    all_points = _posed(pool, pose, rng.permutation(len(pool)))
+    (within_M,) = (np.abs(all_points.points_N3) <= _HALF).all(axis=1).nonzero()
+    _check_count(count, len(within_M))
+    return LabelledPoints(all_points.points_N3[within_M[:count]], all_points.occupied_N[within_M[:count]])
+
+
+def _posed(pool: PointPool, pose: Pose, index_M: NDArray[np.int64]) -> LabelledPoints:
     points_M3 = lattice_points(pool.grid_N3[index_M], pool.low_3, pool.extent_3)
     return LabelledPoints(pose.to_rig(points_M3), pool.occupied_N[index_M])
 
 
-def _in_box(points_N3: NDArray[np.float64], pool: PointPool, pose: Pose) -> NDArray[np.bool_]:
-    """Which rig-frame points lie in the pool's posed box; refuses a box that leaves the working volume."""
+def _check_count(count: int, available: int) -> None:
+    if count > available:
+        raise UserError(
+            f"query points: {count} asked from a pool of {available}; ask for fewer or prepare a larger pool"
+        )
+
+
+def _in_box(points_N3: NDArray[np.float64], pool: PointPool, pose: Pose) -> tuple[NDArray[np.bool_], bool]:
+    """Which rig-frame points lie in the pool's posed box, and whether the working volume holds the whole box."""
     high_3 = pool.low_3 + pool.extent_3
     corners_83 = pose.to_rig(np.array(list(product(*zip(pool.low_3, high_3, strict=True)))))
-    reach = float(np.abs(corners_83).max())
-    if reach > _HALF + 1e-6:
-        raise UserError(
-            f"pose: the object's box reaches {reach:.4f} m from the fixation point along an axis, "
-            f"beyond the cube of +-{_HALF} m; lower the scale ({pose.scale:.4f}) or move the centre"
-        )
     object_N3 = pose.to_object(points_N3)
-    return np.asarray(((object_N3 > pool.low_3) & (object_N3 < high_3)).all(axis=1))
+    inside_N = np.asarray(((object_N3 > pool.low_3) & (object_N3 < high_3)).all(axis=1))
+    return inside_N, bool(np.abs(corners_83).max() <= _HALF + 1e-6)
