@@ -20,6 +20,7 @@ from stereo_occ.metrics.curves import logit_counts
 from stereo_occ.metrics.mesh import MeshScores, compare_meshes
 from stereo_occ.metrics.points import point_metrics, region_metrics, reliability_sums
 from stereo_occ.metrics.regions import region_points
+from stereo_occ.metrics.size import size_errors
 from stereo_occ.metrics.summary import METRICS
 from stereo_occ.models.base import StereoViews
 from stereo_occ.predictors import ObjectView, Predictor
@@ -90,7 +91,9 @@ def measure(
                     if keep is not None and place == 0:
                         keep(view, picture, predicted, true)
                     scores = _mesh_scores(predicted, true, view, meshes.points)
+                    unit = view.shard.unit(view.view)
                     values |= scores.values
+                    values |= size_errors(predicted, true, view.pose.rig_from_object, unit)
                     failures += [scores.failure] if scores.failure else []
                 result.rows.append({**vars(batch.ids[i]), "failure": "; ".join(failures), **values})
                 cube = of_view["cube"], occupied["cube"]

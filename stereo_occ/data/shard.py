@@ -93,7 +93,8 @@ class Shard:
         return file
 
     def _damaged(self, error: Exception) -> UserError:
-        return UserError(f"{self.path}: cannot read the shard ({error}); delete it and render again")
+        reason = " ".join(str(error).split())
+        return UserError(f"{self.path}: cannot read the shard ({reason}); delete it and render again")
 
     @cached_property
     def _opened(self) -> dict[str, h5py.Dataset]:
@@ -188,6 +189,10 @@ class Shard:
     def pose(self, view: int) -> Pose:
         """The object's pose."""
         return Pose.from_matrix(self._row("views/rig_from_object", view))
+
+    def unit(self, view: int) -> float:
+        """Metres per unit of the rig frame."""
+        return float(self._row("views/unit", view)) if "views/unit" in self._file else 1.0
 
     @cached_property
     def _rows(self) -> dict[str, tuple[NDArray[np.float64], NDArray[np.bool_]]]:

@@ -29,6 +29,8 @@ METRICS = {
     "f_score_2": True,
     "recall_2_visible": True,
     "recall_2_occluded": True,
+    "height_error": False,
+    "width_error": False,
 }
 
 #: What identifies a row.

@@ -6,6 +6,7 @@ import pickle
 import socket
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -31,6 +32,14 @@ def contents(path):
             arrays += [pool.grid_N3, pool.low_3, pool.extent_3, pool.part_N, pool.occupied_N]
         texts = (shard.category, shard.object_id, str(shard.facts), len(shard))
     return texts, [np.ascontiguousarray(array).tobytes() for array in arrays]
+
+
+def test_units_are_kept_and_1_without(tmp_path):
+    shape, views = solid("mug", "cup"), views_of(2)
+    for name, unit_N in (("plain", None), ("measured", np.array([0.2, 0.35]))):
+        write_shard(tmp_path / f"{name}.h5", shape, replace(views, unit=unit_N), pools_of(shape))
+        with Shard(tmp_path / f"{name}.h5") as shard:
+            assert [shard.unit(view) for view in range(2)] == ([1, 1] if unit_N is None else [0.2, 0.35])
 
 
 @pytest.mark.parametrize("rows_at_once", [0, 128])
