@@ -11,9 +11,11 @@ from stereo_occ.baselines.config import (
     MeanShapeConfig,
     NearestShapeConfig,
     SemiGlobalMatchingConfig,
+    TruthConfig,
 )
 from stereo_occ.baselines.mean_shape import MeanShape, mean_occupancy
 from stereo_occ.baselines.nearest_shape import NearestShape
+from stereo_occ.baselines.posed_shape import TrueShape
 from stereo_occ.baselines.visual_hull import VisualHull
 from stereo_occ.data.dataset import EvaluationPairs
 from stereo_occ.errors import UserError
@@ -45,7 +47,7 @@ def build_baseline(
         return NearestShape(training("train").shards, config.cells, progress)
     if isinstance(config, MeanShapeConfig):
         return _mean_shape(config, training("train"), training("val"))
-    return VisualHull()
+    return TrueShape() if isinstance(config, TruthConfig) else VisualHull()
 
 
 def _mean_shape(config: MeanShapeConfig, train: EvaluationPairs, val: EvaluationPairs) -> MeanShape:

@@ -51,9 +51,22 @@ class NearestShapeConfig(BaselineConfig):
     cells: int = MISSING  # per side of the grid on which objects are compared
 
 
+@dataclass
+class TruthConfig(BaselineConfig):
+    """The object itself."""
+
+    name: str = "truth"
+
+
 BASELINE_SCHEMAS: dict[str, type[BaselineConfig]] = {
     schema.name: schema
-    for schema in (VisualHullConfig, SemiGlobalMatchingConfig, MeanShapeConfig, NearestShapeConfig)
+    for schema in (
+        VisualHullConfig,
+        SemiGlobalMatchingConfig,
+        MeanShapeConfig,
+        NearestShapeConfig,
+        TruthConfig,
+    )
 }
 
 

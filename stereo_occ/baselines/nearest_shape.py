@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 from trimesh import Trimesh
 
-from stereo_occ.baselines.base import Baseline, Field
+from stereo_occ.baselines.posed_shape import PosedShape
 from stereo_occ.data.shard import Shard
-from stereo_occ.models.base import StereoViews
 from stereo_occ.occupancy.contains import contains
-from stereo_occ.predictors import ObjectView
 
 
-class NearestShape(Baseline):
+class NearestShape(PosedShape):
     """The training object with the highest IoU with the true one in the object frame.
 
     Args:
@@ -43,18 +41,8 @@ class NearestShape(Baseline):
         union_T = (self._occupied_TN | occupied_N).sum(axis=1)
         return int((intersection_T / np.maximum(union_T, 1)).argmax())
 
-    def look(self, view: ObjectView) -> Field:
-        """Inside or outside of the chosen object, posed."""
-        mesh, pose = self.nearest(view.shard).mesh, view.pose
-
-        def field(points_N3: NDArray[np.float64]) -> NDArray[np.float64]:
-            return contains(mesh, pose.to_object(points_N3)).astype(np.float64)
-
-        return field
-
-    def mesh(self, view: ObjectView, picture: StereoViews, resolution: int) -> Trimesh:
-        """The chosen object's own mesh, posed."""
-        return self.nearest(view.shard).mesh.apply_transform(view.pose.rig_from_object)
+    def shape(self, shard: Shard) -> Trimesh:
+        return self.nearest(shard).mesh
 
 
 def grid_occupancy(mesh: Trimesh, cells: int) -> NDArray[np.bool_]:

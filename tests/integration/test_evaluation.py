@@ -208,7 +208,7 @@ def test_the_command(workshop, run, tmp_path):
     assert (tmp_path / "out" / "metrics.json").is_file()
 
 
-@pytest.mark.parametrize("baseline", ["visual_hull", "sgm", "mean_shape", "nearest_shape"])
+@pytest.mark.parametrize("baseline", ["visual_hull", "sgm", "mean_shape", "nearest_shape", "truth"])
 def test_a_baseline_is_measured_like_a_network(workshop, run, tmp_path, evaluation, baseline):
     """On the same object-views, with every metric, and comparable with it."""
     if baseline == "sgm":
@@ -231,9 +231,11 @@ def test_a_baseline_is_measured_like_a_network(workshop, run, tmp_path, evaluati
     assert compared["results"]["iou"]["macro"]["b"] == pytest.approx(metrics["test/iou"])
 
 
-def test_the_nearest_training_shape_of_a_training_object_is_itself(workshop, run, tmp_path):
+@pytest.mark.parametrize("baseline", ["nearest_shape", "truth"])
+def test_a_perfect_answer(workshop, run, tmp_path, baseline):
+    """The nearest training shape of a training object is itself."""
     metrics = workshop.evaluate(
-        run / "best.ckpt", tmp_path, "baseline=nearest_shape", "subset=train",
+        run / "best.ckpt", tmp_path, f"baseline={baseline}", "subset=train",
         "meshes=1", "surface_points=30000", "examples=0",
     )  # fmt: skip
     for name in ("iou", "iou_bbox", "mesh_iou", "f_score_2", "cavity_empty"):
