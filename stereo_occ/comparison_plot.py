@@ -49,4 +49,5 @@ def _panel(axis: Axes, metric: str, differences: Mapping[str, Difference]) -> No
     axis.set_yticks(range(len(places)), places, fontsize=7)
     axis.set_ylim(-0.6, len(places) - 0.4)
     axis.tick_params(axis="x", labelsize=7)
+    axis.locator_params(axis="x", nbins=4)
     axis.set_title(f"{metric} ({'more' if METRICS[metric] else 'less'} is better)", fontsize=8)

@@ -26,6 +26,7 @@ from stereo_occ.models.config import register_schemas as register_model_schemas
 from stereo_occ.render.appearance import BackgroundConfig, LightsConfig, MaterialConfig
 from stereo_occ.render.sensor import SensorConfig
 from stereo_occ.render.texture import TextureConfig
+from stereo_occ.report.config import ReportConfig
 
 
 class Resume(Enum):
@@ -257,6 +258,7 @@ def register_schemas() -> None:
         ("evaluate", EvaluateConfig),
         ("reconstruct", ReconstructConfig),
         ("export", ExportConfig),
+        ("report", ReportConfig),
     ):
         store.store(name=f"base_{name}", node=root)
     for group, schema in (

@@ -31,13 +31,13 @@ def comparison(
     return np.concatenate([*inputs, *(picture(mesh, rig) for mesh in (predicted, true))], axis=1)
 
 
-def picture(mesh: Trimesh, rig: StereoRig) -> NDArray[np.uint8]:
+def picture(mesh: Trimesh, rig: StereoRig, look: Appearance = LOOK) -> NDArray[np.uint8]:
     """A mesh of the rig frame as the left camera sees it ``(PANEL, PANEL, 3)``; white if it is empty."""
     if not len(mesh.faces):
         return np.full((PANEL, PANEL, 3), 255, dtype=np.uint8)
     with StereoRenderer() as renderer:
         renderer.load(mesh)
-        images = renderer.render(resized(rig, PANEL), np.eye(4), LOOK)
+        images = renderer.render(resized(rig, PANEL), np.eye(4), look)
     return np.asarray(images.rgb_2HW3[0])
 
 

@@ -1,0 +1,205 @@
+"""Which evaluations are seeds of one model, and what to call it: from what the files say, not from folders' names."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stereo_occ.checkpoint import plain
+from stereo_occ.compare import SAME, check_alike
+from stereo_occ.config import training_config
+from stereo_occ.errors import UserError
+from stereo_occ.evaluation_rows import Evaluations, read_evaluations, read_facts
+from stereo_occ.shapes.shape import CATEGORIES
+
+#: Settings of a training that do not make another model, by the start of their dotted name.
+SAME_MODEL = (
+    "seed",
+    "paths.",
+    "workers",
+    "progress",
+    "resume",
+    "logger.",
+    "trainer.accelerator",
+    "trainer.devices",
+    "trainer.threads",
+    "trainer.workers",
+    "validation.checkpoint_interval",
+    "validation.keep_all",
+    "scale.",  # only fills in others
+)
+
+#: How many differing settings a label names.
+MOST_NAMED = 3
+
+Settings = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Evaluations of one model from one or several training seeds.
+
+    Attributes:
+        label: name that no other model of the report has.
+        settings: what makes it this model, by dotted key.
+        uses_pair: whether it is shown two views and looks at both.
+    """
+
+    label: str
+    settings: Settings
+    evaluations: Evaluations
+    uses_pair: bool
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Of the first seed."""
+        return self.evaluations.facts[0]
+
+    @property
+    def folders(self) -> list[Path]:
+        """One per seed."""
+        return self.evaluations.folders
+
+    @property
+    def is_network(self) -> bool:
+        """Whether it was trained, and is no baseline."""
+        return "baseline.name" not in self.settings
+
+    def mean(self, metric: str) -> float:
+        """Mean of category means, over the seeds."""
+        return float(np.mean([facts["metrics"][f"test/{metric}"] for facts in self.evaluations.facts]))
+
+    @property
+    def seeds(self) -> list[int | None]:
+        """Of each training; None where the file does not say."""
+        return [
+            (facts.get("trained") or {}).get("config", {}).get("seed") for facts in self.evaluations.facts
+        ]
+
+
+def read_models(folders: Sequence[Path]) -> list[Model]:
+    """The models of these evaluations, in the order in which they first come.
+
+    Raises:
+        UserError: a folder is none of an evaluation, or they were not measured on the same test set in the same way.
+    """
+    groups: dict[str, list[Path]] = {}
+    settings: dict[str, Settings] = {}
+    for folder in dict.fromkeys(folders):
+        of_model = model_settings(read_facts(folder))
+        name = repr(sorted(of_model.items()))
+        groups.setdefault(name, []).append(folder)
+        settings[name] = of_model
+    labels = labels_of(list(settings.values()))
+    models = [
+        Model(label, settings[name], read_evaluations(label, in_group), _uses_pair(settings[name]))
+        for label, (name, in_group) in zip(labels, groups.items(), strict=True)
+    ]
+    for model in models:
+        for index, folder in enumerate(model.folders):
+            _check_same(models[0], model, index, folder)
+        check_alike(models[0].evaluations, model.evaluations)
+    return models
+
+
+def in_order(categories: Iterable[str]) -> list[str]:
+    """Each category once, in the order of the paper."""
+    known = {name: index for index, name in enumerate(CATEGORIES)}
+    return sorted(set(categories), key=lambda name: (known.get(name, len(known)), name))
+
+
+def model_settings(facts: Mapping[str, Any]) -> Settings:
+    """What makes an evaluated model, by dotted key; seeds of one model have the same."""
+    predictor, trained = facts.get("predictor") or {}, facts.get("trained")
+    if "baseline" in predictor:
+        return _flat(predictor["baseline"], "baseline.")
+    control = _flat(facts.get("control") or {"name": "none", "degrees": 0.0}, "control.")
+    if trained is None:
+        return {"parameters": facts.get("parameters"), "step": facts.get("step")} | control
+    config = trained["config"]
+    with suppress(UserError):
+        config = plain(training_config(config))  # with the values that newer keys have by default
+    flat = {key: value for key, value in _flat(config).items() if not key.startswith(SAME_MODEL)}
+    under = {key: flat.pop(key) for key in list(flat) if key.startswith("control.")}
+    trained_under = {} if under == control else {f"trained_under_{key}": under[key] for key in under}
+    return flat | control | trained_under
+
+
+def labels_of(models: Sequence[Settings]) -> list[str]:
+    """A name for each: its kind, and what it differs in from others of that kind."""
+    kinds = [_kind(settings) for settings in models]
+    labels: list[str] = []
+    for kind, settings in zip(kinds, models, strict=True):
+        others = [
+            other for other_kind, other in zip(kinds, models, strict=True) if other_kind == kind
+        ]  # itself among them
+        keys = sorted(
+            {key for other in others for key in other}, key=lambda key: ("control." not in key, key)
+        )
+        differing = [key for key in keys if any(other.get(key) != settings.get(key) for other in others)]
+        named = [
+            _named(key, settings[key]) for key in differing if settings.get(key) not in (None, "none", 0)
+        ]
+        parts = named[:MOST_NAMED] + (["..."] if len(named) > MOST_NAMED else [])
+        label = ", ".join([kind, *parts])
+        same = sum(given == label or given.startswith(f"{label} (") for given in labels)
+        labels.append(f"{label} ({same + 1})" if same else label)
+    return labels
+
+
+def _kind(settings: Settings) -> str:
+    if "baseline.name" in settings:
+        return str(settings["baseline.name"])
+    if "model.name" in settings:
+        return str(settings["model.name"])
+    return f"network of {(settings['parameters'] or 0) / 1e6:.1f} M parameters"
+
+
+def _named(key: str, value: Any) -> str:
+    short = ".".join(key.removesuffix(".name").split(".")[-2:])
+    return f"{short}={value}"
+
+
+def _uses_pair(settings: Settings) -> bool:
+    return (
+        settings.get("model.name", "mono") != "mono"
+        and settings.get("model.views") != "left"
+        and settings.get("control.name", "none") == "none"
+        and "trained_under_control.name" not in settings
+    )
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> Settings:
+    flat: Settings = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            flat |= _flat(value, f"{prefix}{key}.")
+        else:
+            flat[f"{prefix}{key}"] = value
+    return flat
+
+
+def _check_same(first: Model, model: Model, index: int, folder: Path) -> None:
+    """The same test set: objects that were split alike, from renders of one configuration."""
+    facts, expected = model.evaluations.facts[index], first.facts
+    for key in SAME:
+        if facts[key] != expected[key]:
+            raise UserError(
+                f"runs: {first.folders[0]} and {folder} were measured with {key} {expected[key]} and {facts[key]}; "
+                f"evaluate both in the same way"
+            )
+    splits = [(of.get("split") or {}).get("hash") for of in (expected, facts)]
+    data = [Path(str(of.get("data"))).name for of in (expected, facts)]
+    if None not in splits and splits[0] != splits[1]:
+        raise UserError(
+            f"runs: {first.folders[0]} and {folder} have other training or test objects (split {splits[0]} and "
+            f"{splits[1]}); a report is of one test set"
+        )
+    if data[0] != data[1]:
+        raise UserError(
+            f"runs: {first.folders[0]} and {folder} saw other renders, so other poses ({data[0]} and {data[1]}); "
+            f"a report is of one test set"
+        )
