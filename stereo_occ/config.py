@@ -27,6 +27,7 @@ from stereo_occ.render.appearance import BackgroundConfig, LightsConfig, Materia
 from stereo_occ.render.sensor import SensorConfig
 from stereo_occ.render.texture import TextureConfig
 from stereo_occ.report.config import ReportConfig
+from stereo_occ.search.config import SearchConfig
 
 
 class Resume(Enum):
@@ -216,7 +217,7 @@ class RenderConfig(PairsConfig):
     progress: bool = field(default=True)
 
 
-def training_config(values: dict[str, Any]) -> DictConfig:
+def training_config(values: Any) -> DictConfig:
     """The typed training configuration of plain values, as a checkpoint holds them.
 
     Raises:
@@ -248,8 +249,12 @@ def _refers(value: Any) -> bool:
 
 
 def register_schemas() -> None:
-    """Tell Hydra the schemas and OmegaConf the resolver ``divide`` (whole, at least 1); safe to call again."""
+    """Tell Hydra the schemas, and OmegaConf two resolvers; safe to call again.
+
+    ``divide`` is whole and at least 1, ``rest`` what shares leave of 1.
+    """
     OmegaConf.register_new_resolver("divide", lambda a, b: max(1, int(a) // int(b)), replace=True)
+    OmegaConf.register_new_resolver("rest", lambda *shares: 1 - sum(shares), replace=True)
     store = ConfigStore.instance()
     for name, root in (
         ("train", TrainConfig),
@@ -290,4 +295,5 @@ def register_schemas() -> None:
         store.store(group="baseline", name=f"base_{name}", node=baseline_schema)
     for kind, rig_schema in RIG_SCHEMAS.items():
         store.store(group="rig", name=f"base_{kind}_rig", node=rig_schema)
+    store.store(group="hydra/sweeper", name="base_optuna", node=SearchConfig)
     register_model_schemas(store)

@@ -81,6 +81,11 @@ def training_history(checkpoint_path: Path, checkpoint: Mapping[str, Any]) -> li
         return own
 
 
+def best_iou(path: Path) -> float:
+    """The highest ``val/iou`` of a training, from its ``metrics.json``."""
+    return float(json.loads(path.read_text(encoding="utf-8"))["best"]["val/iou"])
+
+
 def without_nan(values: Mapping[str, float]) -> dict[str, Any]:
     """The values with null for those that are not finite, whose names are then listed under ``not_finite``."""
     lost = [name for name, value in values.items() if not math.isfinite(value)]

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
@@ -54,7 +55,8 @@ def find_problems(
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):
         loader = GlobalHydra.instance().config_loader()
         problems, jobs = [], [[f"hydra.searchpath=[file://{config_dir.resolve()}]"] if config_dir else []]
-        for override in overrides:
+        swept = _swept_by_file(config_name, [*jobs[0], *overrides]) if multirun else []
+        for override in [*overrides, *swept]:
             if override.startswith("~") and not loader.get_group_options(_key(override)):
                 problems.append(f"{override}: a key cannot be removed; give it a value instead")
                 continue
@@ -85,10 +87,25 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"did you mean {' or '.join(close)}?" if close else f"known: {', '.join(known)}"
 
 
+def _swept_by_file(config_name: str, overrides: Sequence[str]) -> list[str]:
+    """The sweeps of ``hydra.sweeper.params``, as an experiment may have, that the command line does not replace."""
+    parser = OverridesParser.create()
+    try:
+        first = [_choices(parser.parse_override(override))[0] for override in overrides]
+        params = compose(config_name, first, return_hydra_config=True).hydra.sweeper.get("params") or {}
+    except (*COMPOSITION_ERRORS, IndexError):
+        return []
+    given = {_key(override) for override in overrides}
+    return [f"{key}={value}" for key, value in params.items() if key not in given]
+
+
 def _choices(override: Override) -> list[str]:
-    """The single values of a sweep override, or the override itself."""
+    """The single values of a sweep override, or the override itself; of an interval its ends."""
     if not override.is_sweep_override():
         return [str(override.input_line)]
+    if override.is_interval_sweep():
+        ends: Any = override.value()
+        return [f"{override.get_key_element()}={end}" for end in (ends.start, ends.end)]
     return [f"{override.get_key_element()}={value}" for value in override.sweep_string_iterator()]
 
 
