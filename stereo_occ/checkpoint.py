@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import torch
 from omegaconf import DictConfig, OmegaConf
 
-from stereo_occ.config import TrainConfig
+from stereo_occ.config import TrainConfig, training_config
 from stereo_occ.data.rigs import build_rig
 from stereo_occ.errors import UserError
 from stereo_occ.models.build import build_model
@@ -54,7 +54,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     if (weights := find_weights(str(path))) is not None:
         description, state_dict = read_weights(weights)
         checkpoint: Any = {
-            KEY: {"version": description.get("version"), "config": description.get("config")},
+            KEY: {"version": VERSION, "config": description["config"]},
             "state_dict": state_dict,
             "global_step": description.get("step"),
         }
@@ -94,7 +94,7 @@ def _is_as_written(path: Path) -> bool:
 
 def _checked(checkpoint: Any, path: Path) -> dict[str, Any]:
     ours = checkpoint.get(KEY) if isinstance(checkpoint, dict) else None
-    if not isinstance(ours, dict):
+    if not isinstance(ours, dict) or not {"state_dict", "global_step"} <= checkpoint.keys():
         raise UserError(
             f"checkpoint={path}: is no checkpoint of a training run; give its best.ckpt or last.ckpt"
         )
@@ -102,4 +102,8 @@ def _checked(checkpoint: Any, path: Path) -> dict[str, Any]:
         raise UserError(
             f"checkpoint={path}: has format version {ours.get('version')}, expected {VERSION}; train it again"
         )
+    try:
+        training_config(ours.get("config"))
+    except UserError as error:
+        raise UserError(f"checkpoint={path}: {error}") from error
     return dict(checkpoint)

@@ -1,7 +1,7 @@
 """What a configuration must satisfy beyond types: every problem, one line each with key, value and remedy."""
 
 from collections.abc import Iterator, Sequence
-from math import inf, isclose
+from math import inf, isclose, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from stereo_occ.shapes.shape import CATEGORIES
 
 ACCELERATORS = ("cpu", "gpu", "auto")
 PRECISIONS = ("32-true", "bf16-mixed", "16-mixed")
+LARGEST_SIDE = 4096
 LOOKS = ("lights", "material", "texture", "background", "sensor")
 
 
@@ -89,6 +90,8 @@ def _slice(cfg: DictConfig) -> Iterator[str]:
 def _objects(cfg: DictConfig) -> Iterator[str]:
     yield from _at_least(1, cfg, "data.views", "data.image_side", "data.pool_size")
     yield from _at_least(0, cfg, "data.seed", "workers")
+    if cfg.data.image_side > LARGEST_SIDE:
+        yield f"data.image_side={cfg.data.image_side}: must be at most {LARGEST_SIDE} pixels, which OpenGL can draw"
     names = list(cfg.categories.names)
     for name in names:
         yield from _known("categories.names", name, CATEGORIES)
@@ -235,8 +238,10 @@ def _settings(cfg: DictConfig) -> Iterator[str]:
         if _value(cfg, key) > cfg.data.pool_size:
             yield f"{key}={_value(cfg, key)}: there are only data.pool_size={cfg.data.pool_size} points per object"
     for key in ("optimizer.lr", "trainer.gradient_clip"):
-        if _value(cfg, key) is not None and not _value(cfg, key) > 0:
-            yield f"{key}={_value(cfg, key)}: must be above 0"
+        if _value(cfg, key) is not None and not 0 < _value(cfg, key) < inf:
+            yield f"{key}={_value(cfg, key)}: must be above 0 and finite"
+    if not isfinite(cfg.optimizer.weight_decay):
+        yield f"optimizer.weight_decay={cfg.optimizer.weight_decay}: must be at least 0 and finite"
     shares = [cfg.queries.box, cfg.queries.outside, cfg.queries.surface]
     if not isclose(sum(shares), 1) or min(shares) < 0:
         yield f"queries={shares}: box, outside and surface must be shares that add up to 1"

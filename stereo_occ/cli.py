@@ -60,8 +60,7 @@ def entry_point(
                 task(cfg)
             except Exception as error:
                 problem = _problem(error)
-                hydra_cfg = HydraConfig.get()
-                remove_traces(Path(hydra_cfg.runtime.output_dir), hydra_cfg.job.name)
+                remove_traces(Path(HydraConfig.get().runtime.output_dir))
                 if _runs_elsewhere():
                     raise UserError(problem) from error  # Hydra brings it back to the process of the sweep
                 failures.append(problem)

@@ -7,13 +7,13 @@ from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
-from stereo_occ.checkpoint import KEY, VERSION, read_checkpoint
+from stereo_occ.checkpoint import KEY, read_checkpoint
 from stereo_occ.cli import entry_point
 from stereo_occ.errors import UserError
 from stereo_occ.inference_config import ExportConfig
 from stereo_occ.model_card import model_card, training_command
 from stereo_occ.onnx_export import export_onnx
-from stereo_occ.packaged import SUFFIX, write_weights
+from stereo_occ.packaged import SUFFIX, write_description, write_weights
 from stereo_occ.trained import load_trained
 from stereo_occ.writing import write_whole
 
@@ -39,7 +39,6 @@ def export(cfg: DictConfig) -> list[Path]:
     checkpoint = read_checkpoint(Path(settings.checkpoint))
     run, prefix = Path(settings.checkpoint).parent, Path(settings.output)
     description = {
-        "version": VERSION,
         "step": trained.step,
         "threshold": trained.threshold,
         "metrics": _metrics(settings.metrics, run),
@@ -58,7 +57,10 @@ def export(cfg: DictConfig) -> list[Path]:
         model = load_trained(
             str(weights)
         ).model  # with the rounding of half precision, as the weights beside it
-        written += export_onnx(model, trained.config.data.image_side, prefix)
+        graphs = export_onnx(model, trained.config.data.image_side, prefix)
+        files = {path.name.removeprefix(prefix.name): path for path in (weights, *graphs)}
+        write_description(weights.with_suffix(".json"), description, files)
+        written += graphs
     return written
 
 

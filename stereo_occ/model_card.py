@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from stereo_occ.run_folder import OVERRIDES
+
 
 def model_card(
     name: str, description: Mapping[str, Any], parameters: int, size: int, command: str | None
@@ -50,9 +52,10 @@ def model_card(
 
 
 def training_command(folder: Path) -> str | None:
-    """The command of a run, from the overrides that Hydra noted in its folder."""
-    notes = folder / ".hydra" / "overrides.yaml"
-    if not notes.is_file():
+    """The command of a run, from the overrides that are noted in its folder."""
+    places = (folder / OVERRIDES, folder / ".hydra" / "overrides.yaml")  # formerly
+    notes = next((place for place in places if place.is_file()), None)
+    if notes is None:
         return None
     words = [line.removeprefix("- ").strip() for line in notes.read_text(encoding="utf-8").splitlines()]
     return " ".join(["python -m stereo_occ.train", *(word for word in words if word not in ("[]", ""))])

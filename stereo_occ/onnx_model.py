@@ -1,6 +1,5 @@
 """Answers of an exported model through ONNX Runtime."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from stereo_occ.config import TrainConfig, training_config
 from stereo_occ.errors import UserError
 from stereo_occ.models.base import POINTS_IN_CACHE, StereoViews
 from stereo_occ.onnx_export import INPUTS, onnx_paths
-from stereo_occ.packaged import find_weights
+from stereo_occ.packaged import checked_content, find_weights, read_description
 from stereo_occ.reconstruction import Occupancy
 
 
@@ -58,21 +57,26 @@ def load_onnx(name: str, threads: int | None = None) -> OnnxModel:
     found = find_weights(name)
     prefix = Path(name) if found is None else found.with_suffix("")
     paths = onnx_paths(prefix)
-    for path in (*paths, prefix.with_name(f"{prefix.name}.json")):
+    for path in paths:
         if not path.is_file():
             raise UserError(
                 f"checkpoint={name}: backend=onnx needs {path}; write it with python -m stereo_occ.export "
                 f"checkpoint=... output={prefix} onnx=true"
             )
+    description_path = prefix.with_name(f"{prefix.name}.json")
+    description = read_description(description_path, description_path)
     options = onnxruntime.SessionOptions()
     if threads:
         options.intra_op_num_threads = threads
     try:
         encoder, decoder = (
-            onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+            onnxruntime.InferenceSession(
+                checked_content(path, path.name.removeprefix(prefix.name), description),
+                options,
+                providers=["CPUExecutionProvider"],
+            )
             for path in paths
         )
-        description = json.loads(prefix.with_name(f"{prefix.name}.json").read_text(encoding="utf-8"))
         typed = OmegaConf.to_object(training_config(description["config"]))
         threshold = float(description["threshold"])
     except (

@@ -212,7 +212,7 @@ def _expected(node: Node, key: str) -> str | None:
     if isinstance(node, EnumNode):
         return f"one of {', '.join(node.enum_type.__members__)}"
     if isinstance(node, ListConfig):
-        return f"a list such as [{','.join(map(str, node))}]"
+        return "a list in brackets" if node._is_none() else f"a list such as [{','.join(map(str, node))}]"
     target = node._maybe_dereference_node()
     if isinstance(target, DictConfig):
         return f"given key by key: {' '.join(f'{key}.{name}=...' for name in map(str, target))}"

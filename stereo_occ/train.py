@@ -24,10 +24,16 @@ from stereo_occ.memory import keep_freed_memory
 from stereo_occ.metrics_file import WriteMetrics
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.resume import AtomicCheckpoints, SaveLatest, step_to_resume
+from stereo_occ.run_folder import OVERRIDES
+from stereo_occ.writing import write_whole
 
 
-def train(cfg: DictConfig, folder: Path) -> lightning.Trainer:
-    """Train ``cfg`` in ``folder``, from its latest checkpoint if ``resume=auto`` and there is one."""
+def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None) -> lightning.Trainer:
+    """Train ``cfg`` in ``folder``, from its latest checkpoint if ``resume=auto`` and there is one.
+
+    Args:
+        overrides: of the command line, noted in the folder.
+    """
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
     quiet_libraries()
@@ -39,10 +45,11 @@ def train(cfg: DictConfig, folder: Path) -> lightning.Trainer:
     step = step_to_resume(latest, plain(cfg)) if resume else 0
     lightning.seed_everything(typed.seed, verbose=False)
     task = build_task(cfg, load_weights=not resume)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "config.yaml").write_text(OmegaConf.to_yaml(cfg, resolve=True))
     data = build_data(typed)
     data.prepare_data()
+    write_whole(folder / "config.yaml", OmegaConf.to_yaml(cfg, resolve=True).encode())
+    if overrides is not None:
+        write_whole(folder / OVERRIDES, OmegaConf.to_yaml(list(overrides)).encode())
     boards = build_boards(typed.logger, folder, step)
     callbacks = build_callbacks(cfg, typed, folder, boards)
     trainer = build_trainer(typed, folder, callbacks, boards)
@@ -148,7 +155,8 @@ def build_trainer(
 @entry_point("train", check_training)
 def main(cfg: DictConfig) -> None:
     """Train into Hydra's run folder."""
-    train(cfg, Path(HydraConfig.get().runtime.output_dir))
+    hydra_cfg = HydraConfig.get()
+    train(cfg, Path(hydra_cfg.runtime.output_dir), hydra_cfg.overrides.task)
 
 
 if __name__ == "__main__":

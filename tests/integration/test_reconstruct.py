@@ -8,19 +8,16 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from omegaconf import OmegaConf
+from checkpoints import checkpoint_of
 from PIL import Image
 from runs import program
-from samples import TINY, single_line
+from samples import single_line
 from scipy.spatial import cKDTree
 
 import stereo_occ
-from stereo_occ.checkpoint import KEY, VERSION, plain
 from stereo_occ.cli import compose_config
-from stereo_occ.data.rigs import build_rig
 from stereo_occ.errors import UserError
 from stereo_occ.export import check_export, export
-from stereo_occ.models.build import build_model
 from stereo_occ.problems import find_problems
 from stereo_occ.reconstruct import check_reconstruction, reconstruct_pair
 from stereo_occ.reconstructor import Reconstructor
@@ -29,21 +26,6 @@ from stereo_occ.trained import load_trained
 EXAMPLES = Path(stereo_occ.__file__).parents[1] / "examples"
 PAIR = [f"left={EXAMPLES / 'left.png'}", f"right={EXAMPLES / 'right.png'}"]
 COARSE = ["resolution=16", "threshold=0.5", "threads=null"]
-
-
-def checkpoint_of(folder, *overrides):
-    """A checkpoint as a run leaves it, of an untrained model that says something about every point."""
-    cfg = compose_config("train", [*TINY, "rig=rectified", "placement=free", *overrides])
-    torch.manual_seed(0)
-    model = build_model(plain(cfg.model), build_rig(OmegaConf.to_object(cfg.rig), cfg.data.image_side))
-    *_, head = model.decoder.head.modules()  # so that it says yes here and no there
-    torch.nn.init.normal_(head.weight, std=5)
-    torch.nn.init.zeros_(head.bias)
-    state = {f"model.{name}": tensor for name, tensor in model.state_dict().items()}
-    path = folder / "best.ckpt"
-    content = {KEY: {"version": VERSION, "config": plain(cfg)}, "global_step": 7}
-    torch.save(content | {"state_dict": state | {"threshold": torch.tensor(0.4)}}, path)
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -206,10 +188,10 @@ def test_half_precision_is_half_the_size(checkpoint, tmp_path):
 
 def test_the_card_has_the_metrics_and_the_command(checkpoint, tmp_path):
     run = tmp_path / "run"
-    (run / ".hydra").mkdir(parents=True)
+    run.mkdir()
     shutil.copy(checkpoint, run / "best.ckpt")
     (run / "metrics.json").write_text(json.dumps({"metrics": {"test/iou": 0.5}}))
-    (run / ".hydra" / "overrides.yaml").write_text("- model=stereo\n- steps=12\n")
+    (run / "overrides.yaml").write_text("- model=stereo\n- steps=12\n")
     export(compose_config("export", [f"checkpoint='{run / 'best.ckpt'}'", f"output='{tmp_path / 'x'}'"]))
     card = (tmp_path / "x.md").read_text()
     assert "| `test/iou` | 0.5000 |" in card
