@@ -18,6 +18,7 @@ from omegaconf import DictConfig
 
 from stereo_occ.config import register_schemas
 from stereo_occ.errors import UserError
+from stereo_occ.models.extension import load_extensions
 from stereo_occ.paths import conf_dir
 from stereo_occ.problems import Check, find_problems
 from stereo_occ.run_folder import remove_traces
@@ -38,7 +39,7 @@ warnings.filterwarnings("ignore", r"\s*'hydra/launcher/\w+' is validated against
 
 def entry_point(
     config_name: str, check: Check, aliases: Mapping[str, str] | None = None
-) -> Callable[[Callable[[DictConfig], None]], Callable[[], None]]:
+) -> Callable[[Callable[[DictConfig], object]], Callable[[], None]]:
     """Turn ``task(cfg)`` into a command line program configured by ``conf/<config_name>.yaml``.
 
     Every problem of the configuration ends the program before it starts, with one line each on standard error and
@@ -46,18 +47,21 @@ def entry_point(
     a run folder that it has left nothing in is removed. Of a sweep the other jobs still run, in this process or where a
     launcher runs them.
 
+    What the task returns is what a sweeper that searches maximises.
+
     Args:
         aliases: other names of keys, for those that have the name of a group.
     """
 
-    def decorate(task: Callable[[DictConfig], None]) -> Callable[[], None]:
+    def decorate(task: Callable[[DictConfig], object]) -> Callable[[], None]:
         failures: list[str] = []
 
         @functools.wraps(task)
-        def guarded(cfg: DictConfig) -> None:
+        def guarded(cfg: DictConfig) -> object:
             register_schemas()  # a launcher's process does not know them yet
             try:
-                task(cfg)
+                load_extensions()
+                return task(cfg)
             except Exception as error:
                 problem = _problem(error)
                 remove_traces(Path(HydraConfig.get().runtime.output_dir))
@@ -65,6 +69,7 @@ def entry_point(
                     raise UserError(problem) from error  # Hydra brings it back to the process of the sweep
                 failures.append(problem)
                 _report([problem])
+                return None
 
         register_schemas()
         run_hydra = hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=config_name)(
@@ -75,6 +80,7 @@ def entry_point(
             sys.argv[1:] = [_by_key(argument, aliases or {}) for argument in sys.argv[1:]]
             arguments = get_args_parser().parse_args()
             try:
+                load_extensions()
                 if not any(getattr(arguments, name) for name in ONLY_SHOWS):
                     problems = _missing_launchers(arguments.overrides) or find_problems(
                         arguments.config_name or config_name,

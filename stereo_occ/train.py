@@ -21,11 +21,13 @@ from stereo_occ.loggers.board import Board
 from stereo_occ.loggers.build import build_boards
 from stereo_occ.loggers.show import Show
 from stereo_occ.memory import keep_freed_memory
-from stereo_occ.metrics_file import WriteMetrics
+from stereo_occ.metrics_file import WriteMetrics, best_iou
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.resume import AtomicCheckpoints, SaveLatest, step_to_resume
 from stereo_occ.run_folder import OVERRIDES
 from stereo_occ.writing import write_whole
+
+METRICS_FILE = "metrics.json"
 
 
 def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None) -> lightning.Trainer:
@@ -104,7 +106,7 @@ def build_callbacks(
             enable_version_counter=False,
         ),
         SaveLatest(folder / "last.ckpt", validation.checkpoint_interval, validation.interval),
-        WriteMetrics(folder / "metrics.json"),
+        WriteMetrics(folder / METRICS_FILE),
     ]
     if validation.keep_all:
         callbacks.append(
@@ -153,10 +155,11 @@ def build_trainer(
 
 
 @entry_point("train", check_training)
-def main(cfg: DictConfig) -> None:
-    """Train into Hydra's run folder."""
-    hydra_cfg = HydraConfig.get()
-    train(cfg, Path(hydra_cfg.runtime.output_dir), hydra_cfg.overrides.task)
+def main(cfg: DictConfig) -> float:
+    """Train into Hydra's run folder; the best ``val/iou``."""
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    train(cfg, folder, HydraConfig.get().overrides.task)
+    return best_iou(folder / METRICS_FILE)
 
 
 if __name__ == "__main__":

@@ -145,7 +145,7 @@ def _lookup(known: Mapping[str, T], config: Config, key: str) -> T:
     name = str(config.get("name"))
     if name not in known:
         near = get_close_matches(name, known, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
+        hint = f"; did you mean {near[0]}?" if near else "; docs/extend.md tells how to add one"
         raise UserError(f"{key}: unknown {name!r}; known are {', '.join(known)}{hint}")
     return known[name]
 
