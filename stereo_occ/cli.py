@@ -5,6 +5,7 @@ import os
 import re
 import sys
 import warnings
+from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -82,7 +83,8 @@ def entry_point(
             try:
                 load_extensions()
                 if not any(getattr(arguments, name) for name in ONLY_SHOWS):
-                    problems = _missing_launchers(arguments.overrides) or find_problems(
+                    problems = _refused_flags(arguments) or _missing_launchers(arguments.overrides)
+                    problems = problems or find_problems(
                         arguments.config_name or config_name,
                         arguments.overrides,
                         check,
@@ -141,6 +143,15 @@ def _by_alias(problem: str, aliases: Mapping[str, str]) -> str:
 def _runs_elsewhere() -> bool:
     hydra_cfg = HydraConfig.get()
     return hydra_cfg.mode is RunMode.MULTIRUN and not hydra_cfg.launcher._target_.endswith(".BasicLauncher")
+
+
+def _refused_flags(arguments: Namespace) -> list[str]:
+    """Of Hydra's flags, those that would leave out the checks or run code that a file holds."""
+    flags = {
+        "--config-path": (arguments.config_path, "the settings are this package's own; add yours with --config-dir"),
+        "--experimental-rerun": (arguments.experimental_rerun, "a pickled job can run any code; type the command"),
+    }
+    return [f"{flag} {value}: {remedy}" for flag, (value, remedy) in flags.items() if value]
 
 
 def _missing_launchers(overrides: Sequence[str]) -> list[str]:

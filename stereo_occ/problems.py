@@ -10,7 +10,7 @@ from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
-from hydra.errors import HydraException
+from hydra.errors import HydraException, MissingConfigException
 from omegaconf import (
     BooleanNode,
     DictConfig,
@@ -23,14 +23,19 @@ from omegaconf import (
     StringNode,
 )
 from omegaconf.errors import InterpolationKeyError, OmegaConfBaseException
+from yaml import YAMLError
 
 from stereo_occ.config import register_schemas
+from stereo_occ.foreign_code import code_named
 from stereo_occ.paths import conf_dir
 
 Check = Callable[[DictConfig], list[str]]
 
-# Hydra itself raises ValueError for a group without a choice: model=null.
-COMPOSITION_ERRORS = (HydraException, OmegaConfBaseException, ValueError)
+# Hydra itself raises ValueError for a group without a choice: model=null; YAMLError comes from files of one's own.
+COMPOSITION_ERRORS = (HydraException, OmegaConfBaseException, ValueError, YAMLError)
+
+#: Where files of one's own are.
+SEARCHPATH = "hydra.searchpath"
 
 
 def find_problems(
@@ -54,7 +59,7 @@ def find_problems(
     register_schemas()
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):
         loader = GlobalHydra.instance().config_loader()
-        problems, jobs = [], [[f"hydra.searchpath=[file://{config_dir.resolve()}]"] if config_dir else []]
+        problems, jobs = [], [[f"{SEARCHPATH}=[file://{config_dir.resolve()}]"] if config_dir else []]
         swept = _swept_by_file(config_name, [*jobs[0], *overrides]) if multirun else []
         for override in [*overrides, *swept]:
             if override.startswith("~") and not loader.get_group_options(_key(override)):
@@ -74,6 +79,8 @@ def find_problems(
                 problems.append(f"{override}: gives several values; add -m to run them one after another")
             first = jobs[0]
             jobs = [[*job, choices[0]] for job in jobs] + [[*first, choice] for choice in choices[1:]]
+        if config_dir is not None or any(_key(override) == SEARCHPATH for override in overrides):
+            problems += _code_of_files(config_name, jobs[0])
         unread = tuple(f"{problem.partition('=')[0]}:" for problem in problems)
         for job in jobs:
             problems += [p for p in _problems_of_job(config_name, job, check) if not p.startswith(unread)]
@@ -85,6 +92,14 @@ def nearest(name: str, known: Iterable[str]) -> str:
     known = sorted(known)
     close = get_close_matches(name, known, n=3, cutoff=0.5)
     return f"did you mean {' or '.join(close)}?" if close else f"known: {', '.join(known)}"
+
+
+def _code_of_files(config_name: str, overrides: list[str]) -> list[str]:
+    """What files from elsewhere would run; nothing if they do not compose, which is reported for itself."""
+    try:
+        return code_named(compose(config_name, overrides, return_hydra_config=True).hydra)
+    except COMPOSITION_ERRORS:
+        return []
 
 
 def _swept_by_file(config_name: str, overrides: Sequence[str]) -> list[str]:
@@ -134,7 +149,8 @@ def _problems_one_by_one(config_name: str, overrides: list[str]) -> list[str]:
     """Try the overrides of groups first, then each value on top of the groups that compose."""
     problems: list[str] = []
     loader = GlobalHydra.instance().config_loader()
-    good: list[str] = []
+    good = [override for override in overrides if _key(override) == SEARCHPATH]
+    overrides = [override for override in overrides if override not in good]
     for override in (o for o in overrides if loader.get_group_options(_key(o))):
         try:
             compose(config_name, [*good, override])
@@ -163,7 +179,10 @@ def _problem_of_group(config_name: str, override: str, good: list[str], error: E
     key, _, value = override.partition("=")
     options = GlobalHydra.instance().config_loader().get_group_options(_key(override))
     options = [option for option in options if not option.startswith("base_")]
-    if value not in options:
+    of_ones_own = any(_key(override) == SEARCHPATH for override in good) and not (
+        isinstance(error, MissingConfigException) and error.missing_cfg_file == f"{_key(override)}/{value}"
+    )
+    if value not in options and not of_ones_own:
         return f"{key}={value}: unknown choice; {nearest(str(value), options)}"
     choices = compose(config_name, good, return_hydra_config=True).hydra.runtime.choices
     if _key(override) in choices:
