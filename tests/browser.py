@@ -7,6 +7,7 @@ import os
 import select
 import shutil
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +28,15 @@ FLAGS = [
 #: Seconds for one answer: drawing in software on a busy machine is slow.
 PATIENCE = 240
 
+#: Gives the browser the descriptors that it speaks on, 3 and 4.
+LAUNCH = """
+import fcntl, os, sys
+pipes = [fcntl.fcntl(int(number), fcntl.F_DUPFD, 10) for number in sys.argv[1:3]]
+for number, pipe in enumerate(pipes, 3):
+    os.dup2(pipe, number)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
+
 #: Of one screenshot: those of much taller ones are wrong.
 MOST_ROWS = 4000
 
@@ -40,13 +50,13 @@ class Page:
     """The one page of a browser.
 
     Attributes:
-        problems: errors and warnings of the console, exceptions and what the browser itself logs.
+        errors: of the console, exceptions and what the browser itself logs as such.
         requests: addresses that were asked for, without the content of ``data:`` ones.
     """
 
     def __init__(self, into: int, out: int) -> None:
         self._into, self._out, self._buffer, self._next = into, out, b"", 0
-        self.problems: list[str] = []
+        self.errors: list[str] = []
         self.requests: list[str] = []
         self._session = ""
         targets = self.call("Target.getTargets")["targetInfos"]
@@ -94,7 +104,7 @@ class Page:
         end = time.monotonic() + PATIENCE
         while not self.evaluate(condition):
             if time.monotonic() > end:
-                raise TimeoutError(f"{condition}; the console said {self.problems}")
+                raise TimeoutError(f"{condition}; the console said {self.errors}")
             time.sleep(0.2)
 
     def pixels(self, selector: str | None = None) -> np.ndarray:
@@ -129,12 +139,12 @@ class Page:
 
     def _note(self, event: dict[str, Any]) -> None:
         method, parameters = event.get("method"), event.get("params", {})
-        if method == "Runtime.consoleAPICalled" and parameters["type"] in ("error", "warning", "assert"):
-            self.problems.append(str([argument.get("value") for argument in parameters["args"]]))
+        if method == "Runtime.consoleAPICalled" and parameters["type"] in ("error", "assert"):
+            self.errors.append(str([argument.get("value") for argument in parameters["args"]]))
         elif method == "Runtime.exceptionThrown":
-            self.problems.append(str(parameters["exceptionDetails"]))
-        elif method == "Log.entryAdded" and parameters["entry"]["level"] in ("error", "warning"):
-            self.problems.append(parameters["entry"]["text"])
+            self.errors.append(str(parameters["exceptionDetails"]))
+        elif method == "Log.entryAdded" and parameters["entry"]["level"] == "error":
+            self.errors.append(parameters["entry"]["text"])
         elif method == "Network.requestWillBeSent":
             self.requests.append(parameters["request"]["url"].partition(",")[0])
 
@@ -144,8 +154,7 @@ def browser(chromium: str, profile: Path) -> Iterator[Page]:
     """A page of a new browser, which ends with the block."""
     its_input, into = os.pipe()
     out, its_output = os.pipe()
-    # The browser speaks on the descriptors 3 and 4.
-    command = ["sh", "-c", f'exec "$0" "$@" 3<&{its_input} 4>&{its_output}', chromium, *FLAGS]
+    command = [sys.executable, "-c", LAUNCH, str(its_input), str(its_output), chromium, *FLAGS]
     process = subprocess.Popen(
         [*command, f"--user-data-dir={profile}", "about:blank"],
         pass_fds=(its_input, its_output),

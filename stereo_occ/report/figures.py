@@ -3,6 +3,7 @@
 import io
 import re
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
@@ -35,6 +36,9 @@ _STYLE: dict[Any, Any] = {
     "legend.fontsize": 8,
     "svg.fonttype": "none",
 }
+
+#: Behind text that may lie on a line.
+_VEIL = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1}
 
 Colored = Sequence[tuple[Model, str]]
 
@@ -94,7 +98,15 @@ def precision_recall(counts: Mapping[str, Mapping[str, NDArray[np.int64]]], mode
             axis.plot(recall_K[at], precision_K[at], "o", color=color, markersize=6)
             notes.append((f"AP {average_precision(counts_2K):.2f}", color))
         for row, (note, color) in enumerate(reversed(notes)):
-            axis.text(0.03, 0.04 + 0.085 * row, note, color=color, transform=axis.transAxes, fontsize=8.5)
+            axis.text(
+                0.03,
+                0.04 + 0.085 * row,
+                note,
+                color=color,
+                transform=axis.transAxes,
+                fontsize=8.5,
+                bbox=_VEIL,
+            )
         axis.set(title=category, xlabel="recall", xlim=(0, 1.02), ylim=(0, 1.02))
         axis.grid()
     axes[0].set_ylabel("precision")
@@ -149,9 +161,9 @@ def scatter(focus: Model, against: Model, metric: str = "iou") -> Figure:
             ylim=(0, top),
             aspect="equal",
         )
-        axis.set_xlabel(f"{metric} of {against.label}")
+        axis.set_xlabel(fill(f"{metric} of {against.label}", 32))
         axis.grid()
-    axes[0].set_ylabel(f"{metric} of {focus.label}")
+    axes[0].set_ylabel(fill(f"{metric} of {focus.label}", 32))
     return figure
 
 

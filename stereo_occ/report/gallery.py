@@ -84,7 +84,7 @@ class GalleryRow:
         """
         camera = Camera(intrinsics(radians(self.fov), PANEL), self._camera_from_rig, PANEL, PANEL)
         rig = StereoRig(camera, camera)
-        looks = [replace(LOOK, base_color_3=np.array(to_rgb(panel.color))) for panel in self.panels]
+        looks = [replace(LOOK, base_color_3=np.array(_linear(panel.color))) for panel in self.panels]
         return [
             Image.fromarray(picture(panel.mesh, rig, look))
             for panel, look in zip(self.panels, looks, strict=True)

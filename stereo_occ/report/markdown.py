@@ -3,6 +3,7 @@
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -105,7 +106,7 @@ def _contact_sheet(content: Content, gallery: Mapping[str, Sequence[GalleryRow]]
             axis.set_xticks([])
             axis.set_yticks([])
             axis.spines[:].set_visible(False)
-            axis.set_xlabel(caption, fontsize=6.5, color="#3b424c", labelpad=2)
+            axis.set_xlabel(fill(caption, 28), fontsize=6.5, color="#3b424c", labelpad=2)
         of_row[0].set_ylabel(f"{row.choice.key[0]}\n{row.choice.reason}", fontsize=7.5)
         of_row[0].set_title(title_of(row.choice.key), fontsize=6, loc="left", color="#6b727c", pad=2)
     file = io.BytesIO()

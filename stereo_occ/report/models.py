@@ -159,8 +159,7 @@ def _kind(settings: Settings) -> str:
 
 
 def _named(key: str, value: Any) -> str:
-    short = ".".join(key.removesuffix(".name").split(".")[-2:])
-    return f"{short}={value}"
+    return f"{key.removesuffix('.name').rpartition('.')[2]}={value}"
 
 
 def _uses_pair(settings: Settings) -> bool:
