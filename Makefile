@@ -51,8 +51,9 @@ results: $(READY) ## the README's table and figures from the files under experim
 contact-sheets: $(READY) ## one picture per group of variations, in experiments/variation
 	$(RUN)/python experiments/variation/contact_sheets.py
 
-figures: $(READY) ## the contact sheet of procedural objects
+figures: $(READY) ## the contact sheet of procedural objects, the drawings of the rigs
 	$(RUN)/python experiments/objects/contact_sheet.py
+	$(RUN)/python experiments/rig/draw.py
 
 lock: ## renew requirements.lock from pyproject.toml (needs uv)
 	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes \

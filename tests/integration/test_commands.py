@@ -1,4 +1,4 @@
-"""Every command in the README and on the pages about clusters, metrics and own cameras is one that works."""
+"""Every command in the README and on the pages of docs/ is one that works, every link leads somewhere."""
 
 import re
 import shlex
@@ -12,6 +12,7 @@ from stereo_occ.checks import check_evaluation, check_pairs, check_rendering, ch
 from stereo_occ.export import check_export
 from stereo_occ.problems import find_problems
 from stereo_occ.reconstruct import check_reconstruction
+from stereo_occ.report.__main__ import check_report
 
 CHECKOUT = Path(stereo_occ.__file__).parents[1]
 CHECKS = {
@@ -21,6 +22,7 @@ CHECKS = {
     "inspect": check_pairs,
     "reconstruct": check_reconstruction,
     "export": check_export,
+    "report": check_report,
 }
 
 WITHOUT_ARGUMENTS = {"doctor"}
@@ -42,26 +44,34 @@ def code_lines(text):
     return [line.strip() for block in blocks for line in block.replace("\\\n", " ").splitlines()]
 
 
+PAGES = [CHECKOUT / "README.md", CHECKOUT / "CONTRIBUTING.md", *sorted((CHECKOUT / "docs").glob("*.md"))]
+
+#: Its commands want the parts that it shows; test_extension.py runs them.
+ELSEWHERE = {"extend.md"}
+
+
+def lines_of_pages():
+    return {line for page in PAGES if page.name not in ELSEWHERE for line in code_lines(page.read_text())}
+
+
 def commands():
-    docs = (CHECKOUT / "docs" / f"{name}.md" for name in ("cluster", "metrics", "own-camera"))
-    pages = [CHECKOUT / "README.md", *docs]
-    lines = [line for page in pages for line in code_lines(page.read_text())]
-    return [line for line in lines if "python -m stereo_occ" in line]
+    return sorted(line for line in lines_of_pages() if "python -m stereo_occ" in line)
 
 
 def make_targets():
-    lines = code_lines((CHECKOUT / "README.md").read_text())
-    return [words[1] for line in lines if (words := shlex.split(line, comments=True))[:1] == ["make"]]
+    words = (shlex.split(line, comments=True) for line in lines_of_pages() if line.startswith("make "))
+    return sorted({target for _, target, *_ in words})
 
 
 def test_the_readme_shows_the_commands():
-    shown = {shlex.split(line, comments=True)[2] for line in commands()}
+    lines = code_lines((CHECKOUT / "README.md").read_text())
+    shown = {shlex.split(line, comments=True)[2] for line in lines if line.startswith("python -m stereo_occ")}
     assert shown >= {f"stereo_occ.{program}" for program in CHECKS}
     assert any(" -m " in line.partition("stereo_occ")[2] for line in commands())
 
 
 @pytest.mark.parametrize("command", commands())
-def test_a_command_of_the_readme_composes_without_problems(command, tmp_path, monkeypatch):
+def test_a_command_of_the_pages_composes_without_problems(command, tmp_path, monkeypatch):
     """Files and folders that it names stand for the reader's own; a GPU is assumed."""
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     words = shlex.split(command, comments=True)
@@ -85,10 +95,43 @@ def test_a_command_of_the_readme_composes_without_problems(command, tmp_path, mo
         if program == "reconstruct" and key in EXAMPLE_PAIR:
             key, stand_in = EXAMPLE_PAIR[key]
         overrides.append(f"{key}={stand_in}" if stand_in else word)
+    if overrides == ["--help"]:
+        return
+    config_dir = None
+    if "--config-dir" in overrides:
+        at = overrides.index("--config-dir")
+        del overrides[at : at + 2]
+        config_dir = tmp_path
+        (tmp_path / "experiment").mkdir()
+        (tmp_path / "experiment" / "mine.yaml").write_text("# @package _global_\nsteps: 30\n")
     flags = [word for word in overrides if word.startswith("-")]
     assert set(flags) <= {"-m", "--multirun"}
     values = [word for word in overrides if not word.startswith("-")]
-    assert find_problems(program, values, CHECKS[program], multirun=bool(flags)) == []
+    problems = find_problems(program, values, CHECKS[program], multirun=bool(flags), config_dir=config_dir)
+    assert [problem for problem in problems if "pip install 'stereo-occ[" not in problem] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    """To files of this repository, and to headings in them."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if target.startswith("https://"):
+            continue
+        file, _, anchor = target.partition("#")
+        linked = page.parent / file if file else page
+        assert linked.exists(), target
+        if anchor:
+            headings = re.findall(r"^#+ (.*)$", linked.read_text(), flags=re.MULTILINE)
+            slugs = {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+            assert anchor in slugs, target
+
+
+def test_the_readme_leads_to_every_page():
+    readme = (CHECKOUT / "README.md").read_text()
+    assert [
+        page.name for page in PAGES if page.parent.name == "docs" and f"(docs/{page.name})" not in readme
+    ] == []
 
 
 def test_the_make_targets_of_the_readme_exist():
