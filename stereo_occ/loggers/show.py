@@ -67,19 +67,18 @@ class Show(Callback):
         dataloader_idx: int = 0,
     ) -> None:
         occupied_BN = batch.queries["bbox"].occupied_BN[:, :CURVE_POINTS]
-        self._answers.append((outputs["bbox"][:, :CURVE_POINTS].sigmoid().flatten(), occupied_BN.flatten()))
+        self._answers.append((outputs["bbox"][:, :CURVE_POINTS].flatten(), occupied_BN.flatten()))
 
     def on_validation_end(self, trainer: lightning.Trainer, pl_module: LightningModule) -> None:
         assert isinstance(pl_module, OccupancyTask)
-        probability_N, occupied_N = (torch.cat(parts).cpu() for parts in zip(*self._answers, strict=True))
+        logits_N, occupied_N = (torch.cat(parts).cpu() for parts in zip(*self._answers, strict=True))
         self._answers.clear()
         if not self.shown_on:
             return
         step, threshold = trainer.global_step, float(pl_module.threshold)
         for board in self.shown_on:
-            board.answers("val/precision_recall", probability_N, occupied_N, step)
-        curves = curves_picture(probability_N.numpy(), occupied_N.numpy().astype(bool), threshold)
-        self._picture("val/curves", curves, step)
+            board.answers("val/precision_recall", logits_N.sigmoid(), occupied_N, step)
+        self._picture("val/curves", curves_picture(logits_N, occupied_N, threshold), step)
         data = trainer.datamodule  # type: ignore[attr-defined]
         for example in examples(data.evaluation_dataset("val"), self.config.examples):
             name = f"example/{example.id.object_id}"
