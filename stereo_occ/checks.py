@@ -17,6 +17,7 @@ from stereo_occ.data.rigs import RigConfig, ToedInRigConfig, build_rig
 from stereo_occ.data.scene import draw_scene
 from stereo_occ.data.splits import SUBSETS, split_views, subset_sizes
 from stereo_occ.errors import UserError
+from stereo_occ.group import started_elsewhere
 from stereo_occ.loggers.config import LoggerConfig, logger_problems
 from stereo_occ.models.build import build_model
 from stereo_occ.optimization import OPTIMIZERS, SCHEDULES
@@ -53,6 +54,7 @@ def check_training(cfg: DictConfig) -> list[str]:
         *_settings(cfg),
         *_logger(cfg),
         *_hardware(cfg),
+        *_processes(cfg),
     ]
 
 
@@ -64,6 +66,7 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
         *_at_least(0, cfg, "meshes", "examples", "workers"),
         *_known("subset", cfg.subset, (*SUBSETS, "all", "auto")),
         *_hardware(cfg),
+        *_one_process(cfg),
     ]
     if cfg.checkpoint is None and cfg.baseline is None:
         problems.append("checkpoint: no value given; add checkpoint=... or baseline=...")
@@ -120,8 +123,8 @@ def _folder(cfg: DictConfig) -> Iterator[str]:
         yield f"data.root={cfg.data.root}: no such folder; give the folder of the meshes"
     if not cfg.data.time_limit > 0:
         yield f"data.time_limit={cfg.data.time_limit}: must be above 0 seconds"
-    if not 0.5 <= cfg.data.memory_limit:
-        yield f"data.memory_limit={cfg.data.memory_limit}: must be at least 0.5 GB"
+    if not 1 <= cfg.data.memory_limit:
+        yield f"data.memory_limit={cfg.data.memory_limit}: must be at least 1 GB"
 
 
 def _placement(cfg: DictConfig) -> Iterator[str]:
@@ -269,8 +272,21 @@ def _hardware(cfg: DictConfig) -> Iterator[str]:
     yield from _known("trainer.accelerator", trainer.accelerator, ACCELERATORS)
     if trainer.accelerator == "gpu" and not torch.cuda.is_available():
         yield "trainer.accelerator=gpu: PyTorch sees no GPU here; say trainer=cpu"
-    if trainer.devices != 1:
-        yield f"trainer.devices={trainer.devices}: a run uses one device; for more, run one job per device"
+
+
+def _processes(cfg: DictConfig) -> Iterator[str]:
+    devices, nodes = cfg.trainer.devices, cfg.trainer.nodes
+    few = list(_at_least(1, cfg, "trainer.devices", "trainer.nodes"))
+    yield from few
+    if not few and cfg.batch_size % (devices * nodes):
+        yield f"batch_size={cfg.batch_size}: must be a multiple of the {devices * nodes} processes that share a batch"
+    if not few and nodes > 1 and not started_elsewhere():
+        yield f"trainer.nodes={nodes}: processes on several machines are started by Slurm or torchrun: docs/cluster.md"
+
+
+def _one_process(cfg: DictConfig) -> Iterator[str]:
+    if cfg.trainer.devices * cfg.trainer.nodes != 1:
+        yield f"trainer.devices={cfg.trainer.devices}: an evaluation is one process; say trainer=cpu or trainer=gpu"
 
 
 def _at_least(minimum: int, cfg: DictConfig, *keys: str) -> Iterator[str]:

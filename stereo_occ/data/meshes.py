@@ -10,7 +10,7 @@ from pathlib import Path
 from pebble import ProcessExpired, ProcessPool
 from tqdm import tqdm
 
-from stereo_occ.data.processes import start_bounded_worker
+from stereo_occ.data.processes import limit_memory, start_worker
 from stereo_occ.errors import UserError
 from stereo_occ.shapes.inspection import Inspection
 from stereo_occ.shapes.layouts import MeshFile
@@ -79,9 +79,7 @@ def inspect_files(
         context = multiprocessing.get_context("spawn")
         with (
             tqdm(total=len(missing), desc="reading meshes", unit="mesh", disable=not progress) as bar,
-            ProcessPool(
-                count, initializer=start_bounded_worker, initargs=[memory_limit], context=context
-            ) as pool,
+            ProcessPool(count, initializer=_start, initargs=[memory_limit], context=context) as pool,
         ):
             jobs: dict[Future[Path], Path] = {
                 pool.schedule(cache.make, args=(path,), timeout=time_limit): path for path in missing
@@ -106,6 +104,12 @@ def without_copies(records: Sequence[MeshRecord]) -> Iterator[MeshRecord]:
         else:
             reason = f"is a copy of {original.category}/{original.object_id}"
             yield replace(record, outcome=replace(record.outcome, reason=reason))
+
+
+def _start(memory_limit: float) -> None:
+    """Begin a process; what it imports, this module's own imports among them, is there already."""
+    start_worker()
+    limit_memory(memory_limit)
 
 
 def _record(file: MeshFile, entry: Path | None, failure: str) -> MeshRecord:

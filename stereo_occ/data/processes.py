@@ -14,12 +14,11 @@ def start_worker() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def start_bounded_worker(gigabytes: float) -> None:
-    """As :func:`start_worker`; besides, a process that wants more memory than this for its data gets an error.
+def limit_memory(gigabytes: float) -> None:
+    """Let this process have no more memory for data than this beside what it has already: more is an error.
 
     The limit is Linux's on data; it has no effect on macOS.
     """
-    start_worker()
     if isfinite(gigabytes):
         _, hard = resource.getrlimit(resource.RLIMIT_DATA)
         limit = _data_in_use() + int(gigabytes * 1e9)

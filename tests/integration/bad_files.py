@@ -280,7 +280,7 @@ FOLDERS = [
          mesh_folder(("t.csv", "file,category,subset\na.obj,mug,dev\n"))),
     Case("no time for a mesh", r"data\.time_limit=0\.0: must be above 0 seconds",
          ["data.time_limit=0"], BROKEN),
-    Case("no memory for a mesh", r"data\.memory_limit=0\.1: must be at least 0\.5 GB",
+    Case("no memory for a mesh", r"data\.memory_limit=0\.1: must be at least 1 GB",
          ["data.memory_limit=0.1"], BROKEN),
     Case("ShapeNet elsewhere", r"data\.root=meshes: holds none of 02876657 \(bottle\)",
          ["data=shapenet"], BROKEN),
