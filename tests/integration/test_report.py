@@ -1,5 +1,9 @@
 """The report of real evaluations in a real browser, without network."""
 
+import json
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 from browser import browser, find_chromium
@@ -38,6 +42,23 @@ def test_the_command_writes_page_markdown_and_figures(page):
     for figure in figures:
         assert f"(report_figures/{figure}.png)" in text
     assert len(read_kept_views(page.parent / "network")) == 3
+
+
+def test_what_an_evaluation_keeps_for_it(workshop, run, page, tmp_path):
+    folder = page.parent / "network"
+    curves = json.loads((folder / "curves.json").read_text())["categories"]
+    facts = json.loads((folder / "metrics.json").read_text())
+    for category, sides in curves.items():  # one object, two views, 500 points each
+        assert sum(sides["empty"]) + sum(sides["occupied"]) == 1000
+        points, _, share = np.array(facts["reliability"][category]).T
+        assert sum(sides["occupied"]) == pytest.approx((points * share).sum())
+    whole = json.loads((run / "metrics.json").read_text())["history"]
+    assert facts["trained"]["history"] == whole
+    alone = shutil.copy(run / "best.ckpt", tmp_path)
+    workshop.evaluate(Path(alone), tmp_path / "alone", *SMALL, "keep=false")
+    facts = json.loads((tmp_path / "alone" / "metrics.json").read_text())
+    assert facts["trained"]["history"] == [entry for entry in whole if entry["step"] <= facts["step"]]
+    assert not (tmp_path / "alone" / "views").exists()
 
 
 def test_what_is_no_evaluation_is_one_line(tmp_path):
