@@ -136,11 +136,17 @@ class TrainerConfig:
     """Hardware."""
 
     accelerator: str = MISSING
-    devices: int = MISSING
+    devices: int = MISSING  # of each node, a process for each
+    nodes: int = 1
     precision: str = MISSING
     threads: int | None = None  # of torch; null leaves torch's choice
     workers: int = MISSING  # loader processes
     gradient_clip: float | None = None
+
+    @property
+    def processes(self) -> int:
+        """That train one model together."""
+        return self.devices * self.nodes
 
 
 @dataclass
@@ -183,7 +189,9 @@ class EvaluateConfig:
     mesh_resolution: int = MISSING  # cells per side of the cube
     surface_points: int = MISSING  # on each surface
     examples: int = MISSING  # meshes and pictures per category
-    keep: bool = True  # mesh, truth and pair of each object's first view, for the report; needs meshes of 1 or more
+    keep: bool = (
+        True  # mesh, truth and pair of each object's first view, for the report; needs meshes of 1 or more
+    )
     data: Any = None
     rig: Any = None
     placement: Any = None

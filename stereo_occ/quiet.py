@@ -15,6 +15,8 @@ BESIDE_THE_POINT = (
     "The `srun` command is available on your system but is not used",
     # A run is one process, on a machine with Slurm as on any other.
     "The `srun` command is available on your system but is not used",
+    # Metrics are of all processes' views before they are logged.
+    "It is recommended to use `self.log",
     # Lightning's own use of torch.
     "`isinstance\\(treespec, LeafSpec\\)` is deprecated",
 )

@@ -14,6 +14,7 @@ from stereo_occ.averaging import WeightAverage
 from stereo_occ.checkpoint import KEY, VERSION
 from stereo_occ.config import TrainConfig
 from stereo_occ.data.batch import Batch
+from stereo_occ.group import gathered, share_buffers
 from stereo_occ.metrics.scores import Scores
 from stereo_occ.models.base import OccupancyModel
 from stereo_occ.models.encoders import ImageEncoder
@@ -88,6 +89,7 @@ class OccupancyTask(lightning.LightningModule):
     def on_validation_start(self) -> None:
         if self.average is not None:
             self.average.swap()
+        share_buffers(self)
 
     def on_validation_end(self) -> None:
         if self.average is not None:  # after the callbacks, which draw and save
@@ -102,12 +104,12 @@ class OccupancyTask(lightning.LightningModule):
             name: self.model.decode_all(code, q.points_BN3).float() for name, q in batch.queries.items()
         }
         self.scores.update(batch, logits)
-        loss = binary_cross_entropy_with_logits(logits["bbox"], batch.queries["bbox"].occupied_BN)
-        self.log("val/loss", loss, batch_size=len(batch))
         return logits
 
     def on_validation_epoch_end(self) -> None:
+        self.scores.merge(gathered(self.scores))
         self.threshold.fill_(self.scores.best_threshold())
+        self.log("val/loss", self.scores.loss())
         values = self.scores.summary(float(self.threshold)) | {"iou_at_0.5": self.scores.summary(0.5)["iou"]}
         self.log_dict({f"val/{name}": value for name, value in values.items()})
         self.log("val/threshold", self.threshold)

@@ -17,6 +17,7 @@ from stereo_occ.checks import check_training
 from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
 from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.group import is_first, run_in_processes, started_elsewhere
 from stereo_occ.loggers.board import Board
 from stereo_occ.loggers.build import build_boards
 from stereo_occ.loggers.show import Show
@@ -48,11 +49,13 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
     lightning.seed_everything(typed.seed, verbose=False)
     task = build_task(cfg, load_weights=not resume)
     data = build_data(typed)
-    data.prepare_data()
-    write_whole(folder / "config.yaml", OmegaConf.to_yaml(cfg, resolve=True).encode())
-    if overrides is not None:
-        write_whole(folder / OVERRIDES, OmegaConf.to_yaml(list(overrides)).encode())
-    boards = build_boards(typed.logger, folder, step)
+    boards: list[Board] = []
+    if is_first():
+        data.prepare_data()
+        write_whole(folder / "config.yaml", OmegaConf.to_yaml(cfg, resolve=True).encode())
+        if overrides is not None:
+            write_whole(folder / OVERRIDES, OmegaConf.to_yaml(list(overrides)).encode())
+        boards = build_boards(typed.logger, folder, step)
     callbacks = build_callbacks(cfg, typed, folder, boards)
     trainer = build_trainer(typed, folder, callbacks, boards)
     try:
@@ -136,6 +139,8 @@ def build_trainer(
     return lightning.Trainer(
         accelerator=typed.trainer.accelerator,
         devices=typed.trainer.devices,
+        num_nodes=typed.trainer.nodes,
+        strategy="ddp" if typed.trainer.processes > 1 else "auto",
         precision=typed.trainer.precision,  # type: ignore[arg-type]
         max_steps=typed.steps,
         max_epochs=-1,
@@ -158,7 +163,11 @@ def build_trainer(
 def main(cfg: DictConfig) -> float:
     """Train into Hydra's run folder; the best ``val/iou``."""
     folder = Path(HydraConfig.get().runtime.output_dir)
-    train(cfg, folder, HydraConfig.get().overrides.task)
+    arguments = cfg, folder, list(HydraConfig.get().overrides.task)
+    if cfg.trainer.devices > 1 and not started_elsewhere():
+        run_in_processes(cfg.trainer.devices, train, *arguments)
+    else:
+        train(*arguments)
     return best_iou(folder / METRICS_FILE)
 
 

@@ -10,12 +10,13 @@ from stereo_occ.data.augmentation import AugmentationConfig
 from stereo_occ.data.batch import Batch
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.controls import ControlConfig
-from stereo_occ.data.dataset import EvaluationPairs, ShuffledBatches, TrainingPairs
+from stereo_occ.data.dataset import DealtBatches, EvaluationPairs, ShuffledBatches, TrainingPairs
 from stereo_occ.data.objects import members
 from stereo_occ.data.prepare import PreparedShards, prepare
 from stereo_occ.data.shard import Shard
 from stereo_occ.data.splits import SUBSETS, split_views
 from stereo_occ.errors import UserError
+from stereo_occ.group import place
 
 NO_OBJECTS = "no object is in {}; change data.fractions, or the lists that the data set comes with"
 
@@ -117,7 +118,7 @@ class PairsDataModule(lightning.LightningDataModule):
         )
         first_step = self.trainer.global_step if self.trainer else 0
         batches = ShuffledBatches(
-            len(dataset), settings["batch_size"], settings["steps"], settings["seed"], first_step
+            len(dataset), settings["batch_size"], settings["steps"], settings["seed"], first_step, place()
         )
         return self._loader(dataset, batch_sampler=batches)
 
@@ -127,7 +128,10 @@ class PairsDataModule(lightning.LightningDataModule):
 
     def evaluation_loader(self, subset: str) -> DataLoader[Batch]:
         """Fixed points on any subset."""
-        return self._loader(self.evaluation_dataset(subset), batch_size=self.evaluation_batch_size)
+        dataset = self.evaluation_dataset(subset)
+        return self._loader(
+            dataset, batch_sampler=DealtBatches(len(dataset), self.evaluation_batch_size, place())
+        )
 
     def evaluation_dataset(self, subset: str) -> EvaluationPairs:
         """The first ``evaluation_views`` poses of each object of a subset, with fixed points."""

@@ -14,6 +14,7 @@ from stereo_occ.data.augmentation import AugmentationConfig, augmented
 from stereo_occ.data.batch import Batch, ImageTruth, Queries, ViewId
 from stereo_occ.data.controls import ControlConfig, controlled
 from stereo_occ.data.shard import Shard
+from stereo_occ.errors import UserError
 from stereo_occ.models.base import StereoViews
 from stereo_occ.occupancy.queries import (
     LabelledPoints,
@@ -40,9 +41,29 @@ class ShuffledBatches(Sampler[list[Draw]]):
 
     The stream is one permutation of all items after another, cut into batches without regard to where a permutation
     ends, so every batch is full and a run continues from any step with the data it would have seen.
+
+    Args:
+        place: which of how many processes this is; each gets an equal part of every batch.
+
+    Raises:
+        UserError: a batch cannot be divided equally.
     """
 
-    def __init__(self, items: int, batch_size: int, steps: int, seed: int, first_step: int = 0) -> None:
+    def __init__(
+        self,
+        items: int,
+        batch_size: int,
+        steps: int,
+        seed: int,
+        first_step: int = 0,
+        place: tuple[int, int] = (0, 1),
+    ) -> None:
+        self.rank, processes = place
+        if batch_size % processes:
+            raise UserError(
+                f"batch_size={batch_size}: must be a multiple of the {processes} processes that share it"
+            )
+        self.part = batch_size // processes
         self.items = items
         self.batch_size = batch_size
         self.steps = steps
@@ -61,8 +82,30 @@ class ShuffledBatches(Sampler[list[Draw]]):
             for position in range(max(first, start), min(last, start + self.items)):
                 batch.append(Draw(int(order[position - start]), position))
                 if len(batch) == self.batch_size:
-                    yield batch
+                    yield batch[self.rank * self.part : (self.rank + 1) * self.part]
                     batch = []
+
+
+class DealtBatches(Sampler[list[int]]):
+    """Batches of all items in order, the same whoever gets them, dealt out in turn to the processes.
+
+    Nothing is cut or filled up. A process that would get nothing gets the first batch, like the first process.
+
+    Args:
+        place: which of how many processes this is.
+    """
+
+    def __init__(self, items: int, batch_size: int, place: tuple[int, int] = (0, 1)) -> None:
+        rank, processes = place
+        starts = range(0, items, batch_size)
+        batches = [list(range(start, min(start + batch_size, items))) for start in starts]
+        self.batches = batches[rank::processes] or batches[:1]
+
+    def __len__(self) -> int:
+        return len(self.batches)
+
+    def __iter__(self) -> Iterator[list[int]]:
+        return iter(self.batches)
 
 
 class PairsDataset(Dataset[Batch]):

@@ -1,9 +1,11 @@
 """IoU of many object-views, gathered batch by batch and summed up as the protocol says."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import astuple
 
 import torch
 from torch import Tensor
+from torch.nn.functional import binary_cross_entropy_with_logits
 
 from stereo_occ.data.batch import Batch, ViewId
 from stereo_occ.metrics.volumetric import best_threshold, category_means, iou_at_thresholds
@@ -16,39 +18,58 @@ THRESHOLDS = torch.linspace(0.05, 0.95, 19)
 
 
 class Scores:
-    """IoU at every candidate threshold (increasing probabilities), for each view and metric."""
+    """Loss on the points of the box, and IoU at every candidate threshold (increasing probabilities), of each view.
+
+    What is summed up does not depend on the order in which views came, nor on how often one did.
+    """
 
     def __init__(self, thresholds_T: Tensor = THRESHOLDS) -> None:
         self.thresholds_T = thresholds_T
-        self.ids: list[ViewId] = []
-        self._iou: dict[str, list[Tensor]] = {name: [] for name in METRICS.values()}
+        self._loss: dict[ViewId, Tensor] = {}
+        self._iou: dict[str, dict[ViewId, Tensor]] = {name: {} for name in METRICS.values()}
 
     def update(self, batch: Batch, logits: Mapping[str, Tensor]) -> None:
         """Add a batch; ``logits`` holds ``(B, N)`` for each of the batch's query sets."""
-        self.ids += batch.ids
+        occupied_BN = batch.queries["bbox"].occupied_BN
+        loss_BN = binary_cross_entropy_with_logits(logits["bbox"], occupied_BN, reduction="none")
+        self._loss |= zip(batch.ids, loss_BN.mean(dim=1).cpu(), strict=True)
         for queries, metric in METRICS.items():
             iou_BT = iou_at_thresholds(
                 logits[queries], batch.queries[queries].occupied_BN > 0.5, self.thresholds_T
             )
-            self._iou[metric].append(iou_BT.cpu())
+            self._iou[metric] |= zip(batch.ids, iou_BT.cpu(), strict=True)
+
+    def merge(self, others: Iterable["Scores"]) -> None:
+        """Add the views of others."""
+        for other in others:
+            self._loss |= other._loss
+            for metric, iou in other._iou.items():
+                self._iou[metric] |= iou
+
+    def loss(self) -> float:
+        """The mean over all views."""
+        return float(torch.stack([self._loss[view] for view in self._ids]).double().mean())
 
     def best_threshold(self) -> float:
         """The candidate with the highest macro ``iou``: to be called on validation data only."""
-        return best_threshold(torch.cat(self._iou["iou"]), self._categories, self.thresholds_T)
+        iou_VT = torch.stack([self._iou["iou"][view] for view in self._ids])
+        return best_threshold(iou_VT, self._categories, self.thresholds_T)
 
     def summary(self, threshold: float) -> dict[str, float]:
         """``iou`` (macro), ``iou/all``, ``iou/<category>`` and likewise for the other metrics, at ``threshold``."""
+        column = int((self.thresholds_T - threshold).abs().argmin())
         values: dict[str, float] = {}
-        for metric, iou_V in self._at(threshold).items():
+        for metric, iou in self._iou.items():
+            iou_V = torch.stack([iou[view][column] for view in self._ids])
             means = category_means(iou_V, self._categories)
             values[metric] = means.pop("macro")
             values |= {f"{metric}/{name}": mean for name, mean in means.items()}
         return values
 
     @property
-    def _categories(self) -> list[str]:
-        return [view.category for view in self.ids]
+    def _ids(self) -> list[ViewId]:
+        return sorted(self._loss, key=astuple)
 
-    def _at(self, threshold: float) -> dict[str, Tensor]:
-        column = int((self.thresholds_T - threshold).abs().argmin())
-        return {metric: torch.cat(parts)[:, column] for metric, parts in self._iou.items() if parts}
+    @property
+    def _categories(self) -> list[str]:
+        return [view.category for view in self._ids]

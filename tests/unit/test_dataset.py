@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from stereo_occ.config import QueriesConfig
 from stereo_occ.data.batch import Batch, map_tensors
-from stereo_occ.data.dataset import Draw, EvaluationPairs, ShuffledBatches, TrainingPairs
+from stereo_occ.data.dataset import DealtBatches, Draw, EvaluationPairs, ShuffledBatches, TrainingPairs
 from stereo_occ.data.examples import examples
 from stereo_occ.data.shard import Shard
 from stereo_occ.errors import UserError
@@ -54,6 +54,26 @@ def test_every_batch_is_full_and_there_are_as_many_as_steps():
     batches = order(items=7, batch_size=4, steps=9)
     assert [len(batch) for batch in batches] == [4] * 9
     assert len(ShuffledBatches(7, 4, 9, 0)) == 9
+
+
+def test_processes_share_every_batch():
+    alone = order(batch_size=6)
+    parts = [list(ShuffledBatches(10, 6, 12, 0, place=(rank, 3))) for rank in range(3)]
+    assert [list(chain(*three)) for three in zip(*parts, strict=True)] == alone
+    with pytest.raises(UserError, match="batch_size=6: must be a multiple of the 4 processes"):
+        ShuffledBatches(10, 6, 12, 0, place=(0, 4))
+
+
+@pytest.mark.parametrize("items", [1, 3, 4, 5, 8, 11])
+@pytest.mark.parametrize("processes", [1, 2, 3])
+def test_evaluation_is_dealt_out_whole(items, processes):
+    alone = list(DealtBatches(items, 4))
+    assert list(chain(*alone)) == list(range(items))
+    hands = [list(DealtBatches(items, 4, (rank, processes))) for rank in range(processes)]
+    assert all(hands)
+    dealt = [batch for hand in hands[: len(alone)] for batch in hand]
+    assert sorted(dealt) == alone
+    assert all(hand == alone[:1] for hand in hands[len(alone) :])
 
 
 def test_every_permutation_visits_every_item_once_in_a_new_order():
