@@ -160,15 +160,15 @@ def build_trainer(
 
 
 @entry_point("train", check_training)
-def main(cfg: DictConfig) -> float:
-    """Train into Hydra's run folder; the best ``val/iou``."""
+def main(cfg: DictConfig) -> float | None:
+    """Train into Hydra's run folder; the best ``val/iou``, in the first process of a group."""
     folder = Path(HydraConfig.get().runtime.output_dir)
     arguments = cfg, folder, list(HydraConfig.get().overrides.task)
     if cfg.trainer.devices > 1 and not started_elsewhere():
         run_in_processes(cfg.trainer.devices, train, *arguments)
     else:
         train(*arguments)
-    return best_iou(folder / METRICS_FILE)
+    return best_iou(folder / METRICS_FILE) if is_first() else None
 
 
 if __name__ == "__main__":
