@@ -66,7 +66,6 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
         *_at_least(0, cfg, "meshes", "examples", "workers"),
         *_known("subset", cfg.subset, (*SUBSETS, "all", "auto")),
         *_hardware(cfg),
-        *_one_process(cfg),
     ]
     if cfg.checkpoint is None and cfg.baseline is None:
         problems.append("checkpoint: no value given; add checkpoint=... or baseline=...")
@@ -282,11 +281,6 @@ def _processes(cfg: DictConfig) -> Iterator[str]:
         yield f"batch_size={cfg.batch_size}: must be a multiple of the {devices * nodes} processes that share a batch"
     if not few and nodes > 1 and not started_elsewhere():
         yield f"trainer.nodes={nodes}: processes on several machines are started by Slurm or torchrun: docs/cluster.md"
-
-
-def _one_process(cfg: DictConfig) -> Iterator[str]:
-    if cfg.trainer.devices * cfg.trainer.nodes != 1:
-        yield f"trainer.devices={cfg.trainer.devices}: an evaluation is one process; say trainer=cpu or trainer=gpu"
 
 
 def _at_least(minimum: int, cfg: DictConfig, *keys: str) -> Iterator[str]:

@@ -136,7 +136,7 @@ class TrainerConfig:
     """Hardware."""
 
     accelerator: str = MISSING
-    devices: int = MISSING  # of each node, a process for each
+    devices: int = MISSING  # of each node, a training process for each; an evaluation is one process
     nodes: int = 1
     precision: str = MISSING
     threads: int | None = None  # of torch; null leaves torch's choice

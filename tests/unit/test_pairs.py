@@ -54,7 +54,8 @@ def test_a_share_of_the_pairs_is_masked(views):
     like_cluttered = (some == cluttered).all(axis=(1, 2, 3, 4))
     like_masked = (some == masked).all(axis=(1, 2, 3, 4))
     assert (like_cluttered ^ like_masked).all()
-    assert like_cluttered.any() and like_masked.any()
+    assert like_cluttered.any()
+    assert like_masked.any()
 
 
 def test_everything_composes(views):
