@@ -148,8 +148,14 @@ def _runs_elsewhere() -> bool:
 def _refused_flags(arguments: Namespace) -> list[str]:
     """Of Hydra's flags, those that would leave out the checks or run code that a file holds."""
     flags = {
-        "--config-path": (arguments.config_path, "the settings are this package's own; add yours with --config-dir"),
-        "--experimental-rerun": (arguments.experimental_rerun, "a pickled job can run any code; type the command"),
+        "--config-path": (
+            arguments.config_path,
+            "the settings are this package's own; add yours with --config-dir",
+        ),
+        "--experimental-rerun": (
+            arguments.experimental_rerun,
+            "a pickled job can run any code; type the command",
+        ),
     }
     return [f"{flag} {value}: {remedy}" for flag, (value, remedy) in flags.items() if value]
 

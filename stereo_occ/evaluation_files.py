@@ -6,6 +6,7 @@ apply.
 """
 
 import csv
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,14 +17,17 @@ from stereo_occ.data.dataset import EvaluationPairs
 from stereo_occ.data.examples import examples
 from stereo_occ.pictures import comparison
 from stereo_occ.predictors import ObjectView, Predictor
+from stereo_occ.writing import whole_file
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Rows with the same keys as a CSV file; None is an empty cell."""
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
+    """Rows with the same keys as a CSV file, whole or not at all; None is an empty cell."""
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, rows[0])
+    writer.writeheader()
+    writer.writerows(rows)
+    with whole_file(path) as file:
+        file.write(text.getvalue().encode())
 
 
 def write_examples(
@@ -38,12 +42,8 @@ def write_examples(
         name = f"{example.id.category}/{example.id.object_id}_view{example.id.view}"
         for kind, mesh in (("predicted", predicted), ("true", example.true)):
             if len(mesh.faces):
-                mesh.export(_inside(folder / "meshes", f"{name}_{kind}.glb"))
+                with whole_file(folder / "meshes" / f"{name}_{kind}.glb") as file:
+                    mesh.export(file, file_type="glb")
         strip = comparison(views.left_BCHW[0], views.right_BCHW[0], predicted, example.true, view.rig)
-        Image.fromarray(strip).save(_inside(folder / "pictures", f"{name}.png"))
-
-
-def _inside(folder: Path, name: str) -> Path:
-    path = folder / name
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return path
+        with whole_file(folder / "pictures" / f"{name}.png") as file:
+            Image.fromarray(strip).save(file, "PNG")

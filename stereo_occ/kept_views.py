@@ -21,6 +21,7 @@ from stereo_occ.mesh_output import few_faces
 from stereo_occ.metrics_file import write_json
 from stereo_occ.models.base import StereoViews
 from stereo_occ.predictors import ObjectView
+from stereo_occ.writing import whole_file
 
 FOLDER, INDEX = "views", "index.json"
 
@@ -72,10 +73,12 @@ class ViewKeeper:
         kept.path.parent.mkdir(parents=True, exist_ok=True)
         for kind, mesh in (("predicted", predicted), ("true", true)):
             if len(mesh.faces):
-                few_faces(mesh, MOST_FACES).export(kept._file(f"{kind}.glb"))
+                with whole_file(kept._file(f"{kind}.glb")) as file:
+                    few_faces(mesh, MOST_FACES).export(file, file_type="glb")
         pair_CHW = np.concatenate([picture.left_BCHW[0].numpy(), picture.right_BCHW[0].numpy()], axis=2)
         pair_HWC = (pair_CHW.clip(0, 1) * 255).round().astype(np.uint8).transpose(1, 2, 0)
-        Image.fromarray(pair_HWC).save(kept.pair_file)
+        with whole_file(kept.pair_file) as file:
+            Image.fromarray(pair_HWC).save(file, "PNG")
         self.entries.append(
             {
                 "name": name,

@@ -1,6 +1,7 @@
 """What became of each mesh of a data set: a table and sheets of pictures to look through."""
 
 import csv
+import io
 from collections import Counter
 from collections.abc import Sequence
 from math import pi
@@ -21,6 +22,7 @@ from stereo_occ.geometry.camera import toed_in_rig
 from stereo_occ.occupancy.contains import contains
 from stereo_occ.pictures import PANEL, picture
 from stereo_occ.shapes.inspection import Inspection, file_from_object
+from stereo_occ.writing import whole_file
 
 COLUMNS, ROWS = 5, 12  # cells of a page
 PANEL_SIDE = 150  # pixels
@@ -50,7 +52,8 @@ def write_quality_report(folder: Path, records: Sequence[MeshRecord], root: Path
             for page, start in enumerate(range(0, len(records), COLUMNS * ROWS), start=1):
                 sheet = _page(records[start : start + COLUMNS * ROWS], _summary(records), bar)
                 name = "quality.png" if page == 1 else f"quality_{page}.png"
-                sheet.quantize(128).save(folder / name, optimize=True)
+                with whole_file(folder / name) as file:
+                    sheet.quantize(128).save(file, "PNG", optimize=True)
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error}); give another folder") from error
 
@@ -58,15 +61,17 @@ def write_quality_report(folder: Path, records: Sequence[MeshRecord], root: Path
 def _write_table(path: Path, records: Sequence[MeshRecord], root: Path) -> None:
     figures = sorted({name for record in records for name in record.outcome.measures})
     head = ["file", "category", "name", "subset", "status", "repair", "reason"]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [*head, *figures], restval="")
-        writer.writeheader()
-        for record in records:
-            mesh_file, outcome = record.file, record.outcome
-            names = (mesh_file.path.relative_to(root).as_posix(), mesh_file.category, mesh_file.object_id)
-            texts = (mesh_file.subset, outcome.status, "; ".join(outcome.steps), outcome.reason)
-            measures = {name: f"{round(value, 6):g}" for name, value in outcome.measures.items()}
-            writer.writerow(dict(zip(head, (*names, *texts), strict=True)) | measures)
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, [*head, *figures], restval="")
+    writer.writeheader()
+    for record in records:
+        mesh_file, outcome = record.file, record.outcome
+        names = (mesh_file.path.relative_to(root).as_posix(), mesh_file.category, mesh_file.object_id)
+        texts = (mesh_file.subset, outcome.status, "; ".join(outcome.steps), outcome.reason)
+        measures = {name: f"{round(value, 6):g}" for name, value in outcome.measures.items()}
+        writer.writerow(dict(zip(head, (*names, *texts), strict=True)) | measures)
+    with whole_file(path) as file:
+        file.write(text.getvalue().encode("utf-8"))
 
 
 def _summary(records: Sequence[MeshRecord]) -> str:

@@ -1,8 +1,7 @@
 """Runs that are stopped at any moment and go on as if they had not been."""
 
-import os
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, cast
 
 import torch
 from lightning.fabric.plugins import TorchCheckpointIO
@@ -12,6 +11,7 @@ from lightning.pytorch.callbacks import Checkpoint
 from stereo_occ.checkpoint import KEY, plain, read_checkpoint
 from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
+from stereo_occ.writing import whole_file
 
 #: What must not change between the parts of a run. Hardware, logging and the length of the run may.
 FIXED = (
@@ -54,20 +54,35 @@ class AtomicCheckpoints(TorchCheckpointIO):
         Raises:
             UserError: the disk is full or the folder cannot be written.
         """
-        target = Path(path)
-        temporary = target.with_name(f".{target.name}.part")
+        target, refusals = Path(path), list[OSError]()
         try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with temporary.open("wb") as file:
-                torch.save(checkpoint, file)
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.replace(target)
-        except (OSError, RuntimeError) as error:  # torch's own writer raises RuntimeError
-            temporary.unlink(missing_ok=True)
+            with whole_file(target) as file:
+                torch.save(checkpoint, cast(BinaryIO, _Noting(file, refusals)))
+        except (
+            OSError,
+            RuntimeError,
+        ) as error:  # torch raises its own, which does not say what the system said
+            reason = next((refusal.strerror for refusal in refusals), None) or " ".join(str(error).split())
             raise UserError(
-                f"{target}: cannot write the checkpoint ({error}); free some disk space"
+                f"{target}: cannot write the checkpoint ({reason}); free some disk space"
             ) from error
+
+
+class _Noting:
+    """A file that notes why it could not be written."""
+
+    def __init__(self, file: BinaryIO, refusals: list[OSError]) -> None:
+        self.file, self.refusals = file, refusals
+
+    def write(self, data: bytes) -> int:
+        try:
+            return self.file.write(data)
+        except OSError as error:
+            self.refusals.append(error)
+            raise
+
+    def flush(self) -> None:
+        self.file.flush()
 
 
 def step_to_resume(checkpoint: Path, config: dict[str, Any]) -> int:

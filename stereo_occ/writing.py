@@ -2,8 +2,9 @@
 
 import os
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from glob import escape
 from pathlib import Path
 from typing import BinaryIO
 
@@ -20,19 +21,42 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
     """A file to write that gets its name when it is complete and on the disk; if that fails, ``path`` is as before.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: it cannot be written; names ``path``.
     """
-    partial = partial_path(path, socket.gethostname(), os.getpid())
+    host = socket.gethostname()
+    partial = partial_path(path, host, os.getpid())
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        remove_partial(path.parent.glob(f"{escape(f'.{path.name}.{host}.')}*.part"))
         with partial.open("wb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
         partial.replace(path)
+    except OSError as error:
+        error.filename, error.filename2 = str(path), None
+        raise
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def remove_partial(files: Iterable[Path]) -> None:
+    """Of partial files, remove those that processes of this machine have left behind that are no more."""
+    for partial in files:
+        _, process, _ = partial.name.rsplit(".", 2)
+        if f".{socket.gethostname()}.{process}." in partial.name and not _is_alive(int(process)):
+            partial.unlink(missing_ok=True)
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # another user's
+        return True
+    return True
 
 
 def write_whole(path: Path, data: bytes) -> None:

@@ -24,12 +24,12 @@ from stereo_occ.data.pairs import Stream, render_views
 from stereo_occ.data.processes import start_worker
 from stereo_occ.data.rigs import ToedInRigConfig
 from stereo_occ.data.shard import VERSION
-from stereo_occ.data.shard_writing import remove_partial, write_shard
+from stereo_occ.data.shard_writing import write_shard
 from stereo_occ.errors import UserError
 from stereo_occ.occupancy.pools import box_pool, surface_pool
 from stereo_occ.render.stereo import StereoRenderer
 from stereo_occ.shapes.layouts import Skipped
-from stereo_occ.writing import whole_file
+from stereo_occ.writing import remove_partial, whole_file
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,8 @@ def prepare(
     found = zip(prepared.sources, prepared.paths, strict=True)
     missing = [(source, path) for source, path in found if not path.exists()]
     if missing:
-        remove_partial(prepared.folder)
+        folder = prepared.folder
+        remove_partial((*folder.glob(".*.part"), *folder.glob("*/.*.part")))
         _write_description(prepared.folder, pairs)
         workers = min(len(missing), pairs.workers or len(os.sched_getaffinity(0)))
         bar = tqdm(

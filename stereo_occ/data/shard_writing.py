@@ -82,24 +82,6 @@ def _file_image(shape: Shape, views: Views, pools: Mapping[str, PointPool]) -> m
     return image.getbuffer()
 
 
-def remove_partial(folder: Path) -> None:
-    """Remove what killed processes of this machine left behind in ``folder`` and its category folders."""
-    for partial in (*folder.glob(".*.part"), *folder.glob("*/.*.part")):
-        _, process, _ = partial.name.rsplit(".", 2)
-        if f".{socket.gethostname()}.{process}." in partial.name and not _is_alive(int(process)):
-            partial.unlink(missing_ok=True)
-
-
-def _is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # another user's
-        return True
-    return True
-
-
 def _write(file: h5py.File, name: str, array: NDArray[Any], chunk_length: int | None = None) -> None:
     length = len(array) if chunk_length is None else min(chunk_length, len(array))
     file.create_dataset(

@@ -16,8 +16,9 @@ from samples import pools_of, small_shard, solid, views_of
 
 from stereo_occ.data import shard as shard_module
 from stereo_occ.data.shard import VERSION, Shard, checksum_path
-from stereo_occ.data.shard_writing import partial_path, remove_partial, write_shard
+from stereo_occ.data.shard_writing import write_shard
 from stereo_occ.errors import UserError
+from stereo_occ.writing import partial_path, remove_partial, write_whole
 
 
 def contents(path):
@@ -241,5 +242,8 @@ def test_what_dead_processes_left_is_removed_and_the_rest_kept(tmp_path):
     another_machines = partial_path(path, "node7.cluster", dead.pid)
     for partial in (ours, left_behind, another_machines):
         partial.write_bytes(b"")
-    remove_partial(tmp_path)
+    remove_partial(path.parent.glob(".*.part"))
     assert set(path.parent.iterdir()) == {path, checksum_path(path), ours, another_machines}
+    left_behind.write_bytes(b"")
+    write_whole(path, b"again")
+    assert set(path.parent.iterdir()) == {path, checksum_path(path), another_machines}

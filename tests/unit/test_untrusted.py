@@ -51,7 +51,7 @@ def test_the_payload_works_where_it_is_let(command, proof, monkeypatch):
             {"hydra": {"job": {"env_set": {"LD_PRELOAD": "x.so"}}}},
             "hydra.job.env_set=LD_PRELOAD: variables of",
         ),
-        (PAYLOAD, "_target_: unknown key"),
+        (PAYLOAD, "experiment=theirs: In 'experiment/theirs': ConfigKeyError"),
         ({"model": PAYLOAD}, "model"),
         ({"optimizer": PAYLOAD}, "optimizer"),
     ],
