@@ -1,6 +1,7 @@
 """What is wrong with a command line: every problem at once, one line each with the key, its value and a remedy."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -38,6 +39,17 @@ COMPOSITION_ERRORS = (HydraException, OmegaConfBaseException, ValueError, YAMLEr
 SEARCHPATH = "hydra.searchpath"
 
 
+@contextmanager
+def _composing() -> Iterator[None]:
+    """Hydra for compositions, also within a program that Hydra runs."""
+    running, GlobalHydra.instance().hydra = GlobalHydra.instance().hydra, None
+    try:
+        with initialize_config_dir(str(conf_dir()), version_base="1.3"):
+            yield
+    finally:
+        GlobalHydra.instance().hydra = running
+
+
 def find_problems(
     config_name: str,
     overrides: Sequence[str],
@@ -57,7 +69,7 @@ def find_problems(
         config_dir: searched for groups beside ``conf/``.
     """
     register_schemas()
-    with initialize_config_dir(str(conf_dir()), version_base="1.3"):
+    with _composing():
         loader = GlobalHydra.instance().config_loader()
         problems, jobs = [], [[f"{SEARCHPATH}=[file://{config_dir.resolve()}]"] if config_dir else []]
         swept = _swept_by_file(config_name, [*jobs[0], *overrides]) if multirun else []

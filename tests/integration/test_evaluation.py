@@ -255,6 +255,11 @@ def test_a_baseline_needs_no_checkpoint(workshop, tmp_path):
     )  # fmt: skip
     metrics = evaluate(cfg, tmp_path)
     results = json.loads((tmp_path / "metrics.json").read_text())
+    arguments = [f"training={data}", f"paths.data={workshop.root / 'data'}", "hydra.run.dir=out", "workers=1"]
+    small = ["progress=false", "views=2", "points=500", "meshes=0", "examples=0"]
+    done = program("-m", "stereo_occ.evaluate", "baseline=visual_hull", *arguments, *small, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads((tmp_path / "out" / "metrics.json").read_text())["metrics"] == results["metrics"]
     assert results["predictor"] == {"baseline": {"name": "visual_hull"}}
     assert (results["objects"], results["parameters"]) == (3, None)
     assert 0 < metrics["test/iou"] < 1
