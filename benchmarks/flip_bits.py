@@ -5,6 +5,7 @@ damaged twice: read (by what trains and evaluates) and verified (by render verif
 """
 
 import argparse
+import hashlib
 import json
 import random
 import sys
@@ -19,7 +20,7 @@ import numpy as np
 import torch
 
 from stereo_occ.checkpoint import read_checkpoint
-from stereo_occ.data.shard import Shard
+from stereo_occ.data.shard import Shard, checksum_path
 from stereo_occ.data.verify import verify
 from stereo_occ.errors import UserError
 from stereo_occ.provenance import environment
@@ -95,7 +96,7 @@ def row(path: Path, read: Read, flips: int, cuts: int, rng: random.Random) -> di
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--shard", type=Path, required=True, help="with its .sha256 beside it")
+    parser.add_argument("--shard", type=Path, required=True)
     parser.add_argument("--checkpoint", type=Path, required=True)
     parser.add_argument("--weights", type=Path, required=True, help=".safetensors with its .json beside it")
     parser.add_argument("--flips", type=int, default=200, help="of each file")
@@ -108,14 +109,15 @@ def main() -> None:
         shard, checkpoint, weights = (
             Path(root) / path.name for path in (options.shard, options.checkpoint, options.weights)
         )
-        for source, copy, suffix in (
-            (options.shard, shard, ".h5.sha256"),
-            (options.checkpoint, checkpoint, None),
-            (options.weights, weights, ".json"),
-        ):  # fmt: skip
+        for source, copy in (
+            (options.shard, shard),
+            (options.checkpoint, checkpoint),
+            (options.weights, weights),
+        ):
             copy.write_bytes(source.read_bytes())
-            if suffix:
-                copy.with_suffix(suffix).write_bytes(source.with_suffix(suffix).read_bytes())
+        weights.with_suffix(".json").write_bytes(options.weights.with_suffix(".json").read_bytes())
+        digest = hashlib.sha256(shard.read_bytes()).hexdigest()
+        checksum_path(shard).write_text(f"{digest}  {shard.name}\n")  # as it was written
         of_weights = partial(checkpoint_content, weights)
         files: dict[str, tuple[Path, Read]] = {
             "shard, read": (shard, shard_content),

@@ -4,6 +4,7 @@ Half of the kills hit the command alone, half it and its rendering processes; bo
 """
 
 import argparse
+import json
 import os
 import random
 import signal
@@ -12,6 +13,8 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+
+from stereo_occ.provenance import environment
 
 
 def start(folder: Path, overrides: list[str], workers: int) -> "subprocess.Popen[bytes]":
@@ -44,10 +47,11 @@ def shards(folder: Path) -> dict[Path, int]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kills", type=int, default=12)
+    parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--objects", type=int, default=4, help="of each category")
     parser.add_argument("--views", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--output", type=Path, help="JSON file for the table")
     options = parser.parse_args()
     counts = ",".join(f"{name}:{options.objects}" for name in ("mug", "bowl", "bottle"))
     overrides = [f"scale.counts={{{counts}}}", f"data.views={options.views}"]
@@ -66,7 +70,7 @@ def main() -> None:
         )
 
         folder = Path(root) / "killed"
-        redone = 0
+        redone, rows = 0, []
         print(f"{'kill':>4} {'after s':>8} {'whom':>8} {'shards':>7} {'partial files':>14}")
         for kill in range(options.kills):
             before = shards(folder)
@@ -81,12 +85,22 @@ def main() -> None:
             redone += sum(after[path] != written for path, written in before.items())
             partial = len(list(folder.rglob("*.part")))
             whom = "group" if group else "command"
+            rows.append({"seconds": round(wait, 1), "whom": whom, "shards": len(after), "partial": partial})
             print(f"{kill + 1:>4} {wait:>8.1f} {whom:>8} {len(after):>7} {partial:>14}", flush=True)
         before = shards(folder)
         finish(start(folder, overrides, 2))
         redone += sum(shards(folder)[path] != written for path, written in before.items())
         same = same and files(folder) == renderings[0]
         print(f"in the end {'identical' if same else 'DIFFERENT'}; {redone} finished objects rendered again")
+        if options.output:
+            content = {
+                "files": len(renderings[0]),
+                "kills": rows,
+                "identical": same,
+                "rendered again": redone,
+            }
+            options.output.parent.mkdir(parents=True, exist_ok=True)
+            options.output.write_text(json.dumps(environment() | content, indent=2) + "\n")
         sys.exit(0 if same and not redone else 1)
 
 

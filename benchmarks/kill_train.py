@@ -82,6 +82,13 @@ def same(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
+def begins(process: "subprocess.Popen[bytes]", folder: Path) -> None:
+    """Wait until the process is about to train, which it notes in its folder, or has ended."""
+    noted, started = folder / "config.yaml", time.time()
+    while process.poll() is None and not (noted.exists() and noted.stat().st_mtime >= started):
+        time.sleep(0.02)
+
+
 def step_of(checkpoint: Path) -> int | None:
     """None where there is no checkpoint yet; one that is half written would raise."""
     return int(torch.load(checkpoint, weights_only=True)["global_step"]) if checkpoint.exists() else None
@@ -101,10 +108,13 @@ def main() -> None:
         data = Path(root) / "data"
         finish(start(Path(root) / "rendered", data, 4))
         began = time.perf_counter()
-        finish(start(Path(root) / "alone", data, options.steps))
-        seconds = time.perf_counter() - began
+        process = start(Path(root) / "alone", data, options.steps)
+        begins(process, Path(root) / "alone")
+        start_up = time.perf_counter() - began
+        finish(process)
+        seconds = time.perf_counter() - began - start_up
         alone = left_behind(Path(root) / "alone")
-        print(f"left alone: {seconds:.0f} s, {len(alone['TensorBoard'])} curves")
+        print(f"left alone: {start_up:.0f} + {seconds:.0f} s, {len(alone['TensorBoard'])} curves")
         print(
             f"{'kill':>4} {'run':>4} {'after s':>8} {'went on from':>13} {'saved':>6} {'partial files':>14}"
         )
@@ -113,18 +123,24 @@ def main() -> None:
             folder = Path(root) / f"killed_{run}"
             before = step_of(folder / "last.ckpt")
             process = start(folder, data, options.steps)
-            wait = rng.uniform(0.2, 1.1) * seconds
+            began = time.perf_counter()
+            if rng.random() < 0.15:  # before it trains
+                wait = rng.uniform(0, start_up)
+            else:
+                begins(process, folder)
+                wait = rng.uniform(0, seconds)
             try:
                 process.wait(wait)
             except subprocess.TimeoutExpired:
                 process.send_signal(signal.SIGKILL)
                 process.communicate()
+                after = time.perf_counter() - began
                 row = {
-                    "run": run, "seconds": round(wait, 1), "from": before, "latest": step_of(folder / "last.ckpt"),
+                    "run": run, "seconds": round(after, 1), "from": before, "latest": step_of(folder / "last.ckpt"),
                     "partial": len(list(folder.rglob("*.part"))) if folder.exists() else 0,
                 }  # fmt: skip
                 rows.append(row)
-                print(f"{len(rows):>4} {run:>4} {wait:>8.1f} {row['from']!s:>13} {row['latest']!s:>6} "
+                print(f"{len(rows):>4} {run:>4} {after:>8.1f} {row['from']!s:>13} {row['latest']!s:>6} "
                       f"{row['partial']:>14}", flush=True)  # fmt: skip
             else:
                 finish(process)
@@ -138,7 +154,11 @@ def main() -> None:
     if options.output:
         compared_things = sorted(alone)
         content = {"steps": options.steps, "runs": run, "kills": rows, "compared": compared_things}
-        content |= {"different": sorted(differing), "seconds_alone": round(seconds, 1)}
+        content |= {
+            "different": sorted(differing),
+            "seconds to start": round(start_up, 1),
+            "seconds": round(seconds, 1),
+        }
         options.output.parent.mkdir(parents=True, exist_ok=True)
         options.output.write_text(json.dumps(environment() | content, indent=2) + "\n")
     sys.exit(1 if differing else 0)

@@ -16,6 +16,7 @@ from bad_pairs import Case
 from checkpoints import checkpoint_of
 from entry_points import EntryPoints, Outcome
 from omegaconf import OmegaConf
+from permissions import modes_obeyed
 from samples import TINY, pools_of, solid, views_of
 
 import stereo_occ
@@ -26,6 +27,8 @@ from stereo_occ.data.shard_writing import write_shard
 EXAMPLES = Path(stereo_occ.__file__).parents[1] / "examples"
 
 RECTIFIED = ["rig=rectified", "placement=free"]
+
+SMALL = ["scale.counts={mug:1,bowl:1,bottle:1}", "data.views=1", "workers=1", "progress=false"]
 
 
 @pytest.fixture(scope="module")
@@ -137,6 +140,35 @@ def test_train(case, command, checkpoint):
 def test_compare(case, command):
     case.prepare(command.folder)
     refused(case, command("compare", case.arguments))
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments", "closed", "message"),
+    [
+        ("reconstruct", PAIR, "left.png", r"left=left\.png: cannot be read \(.*Permission denied"),
+        ("reconstruct", PAIR, "rig.yaml", r"rig=rig\.yaml: cannot be read \(Permission denied\)"),
+        ("reconstruct", PAIR, "tiny.ckpt", r"checkpoint=tiny\.ckpt: cannot be read \(Permission denied\)"),
+        ("reconstruct", [*PAIR, "output=closed/mug.ply"], "closed", r"closed/mug\.ply: Permission denied; choose another folder"),
+        ("reconstruct", [*PAIR, "left=closed/left.png"], "closed", r"Permission denied; choose another folder"),
+        ("export", ["checkpoint=tiny.ckpt", "output=closed/w"], "closed", r"output=closed/w\..*cannot be written"),
+        ("render", ["paths.outputs=closed/outputs"], "closed", r"Permission denied; choose another folder"),
+        ("render", ["data=meshes", "data.root=closed"], "closed", r"Permission denied"),
+        ("render", [*SMALL, "paths.data=closed/data"], "closed", r"mug_0000\.h5: Permission denied; choose another folder"),
+        ("train", [*TINY, "hydra.run.dir=closed/run"], "closed", r"closed/run: Permission denied; choose another"),
+    ],
+)  # fmt: skip
+def test_without_permission(command, checkpoint, program, arguments, closed, message):
+    folder = command.folder
+    put_pair(folder, checkpoint)
+    if closed == "closed":
+        (folder / closed).mkdir()
+    (folder / closed).chmod(0)
+    try:
+        with modes_obeyed():
+            outcome = command(program, replaced([], arguments))
+    finally:
+        (folder / closed).chmod(0o700)
+    refused(Case("", message), outcome)
 
 
 def test_the_tables_are_long_enough_and_say_each_thing_once():

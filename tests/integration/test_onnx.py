@@ -11,6 +11,7 @@ import stereo_occ
 from stereo_occ.checkpoint import KEY, VERSION, plain
 from stereo_occ.cli import compose_config
 from stereo_occ.data.rigs import build_rig, draw_verging
+from stereo_occ.errors import UserError
 from stereo_occ.export import export
 from stereo_occ.models.base import StereoViews
 from stereo_occ.models.build import build_model
@@ -103,3 +104,15 @@ def test_the_same_mesh(exported):
     ]
     assert meshes[0].volume == pytest.approx(meshes[1].volume, rel=1e-3)
     np.testing.assert_allclose(meshes[0].bounds, meshes[1].bounds, atol=1e-3)
+
+
+@pytest.mark.parametrize("part", ["encoder", "decoder"])
+def test_damaged_graphs_are_named(exported, part):
+    path = exported / f"x_{part}.onnx"
+    whole = path.read_bytes()
+    for damaged in (whole[:-100], whole[: len(whole) // 2] + b"\1" + whole[len(whole) // 2 + 1 :]):
+        path.write_bytes(damaged)
+        with pytest.raises(UserError, match=rf"x_{part}\.onnx: is damaged, or of another export"):
+            load_onnx(str(exported / "x"))
+    path.write_bytes(whole)
+    load_onnx(str(exported / "x"))

@@ -1,12 +1,18 @@
 """Files from elsewhere that would run code: each payload works where it is let, is refused here, and does not run."""
 
 import pickle
+import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
+from checkpoints import checkpoint_of
 from entry_points import EntryPoints
 from hydra.utils import instantiate
+from mesh_files import box, put
+
+from stereo_occ.shapes.mesh_cache import MeshCache
 
 PAYLOAD = {"_target_": "os.mkdir", "path": "it_ran"}
 
@@ -107,3 +113,38 @@ def test_flags_that_leave_out_the_checks(command, proof, flags, line):
     assert (outcome.code, len(outcome.lines)) == (2, 1), outcome
     assert line in outcome.err
     assert not proof.exists()
+
+
+def test_an_archive_writes_nothing(command, proof):
+    """A checkpoint is a zip file; a record of it that leads out of its folder is read by nobody."""
+    path = checkpoint_of(command.folder)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("../it_ran", "x")
+        archive.writestr("best/../../it_ran", "x")
+    outcome = command("export", ["checkpoint=best.ckpt", "output=w"])
+    assert "Traceback" not in outcome.err
+    assert not proof.exists()
+    assert not (command.folder.parent / "it_ran").exists()
+
+
+def test_a_small_file_that_stands_for_a_huge_one(command):
+    """torch compresses nothing; a record of zeros could be a thousand times its size."""
+    path = checkpoint_of(command.folder)
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("best/data/0000", bytes(10_000_000))
+    outcome = command("export", ["checkpoint=best.ckpt", "output=w"])
+    assert (outcome.code, len(outcome.lines)) == (2, 1), outcome
+    assert "best.ckpt: is damaged, or holds more than tensors and plain values" in outcome.err
+
+
+def test_an_entry_of_the_mesh_cache_is_not_unpickled(tmp_path, proof, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = put(box(1, 1, 2), tmp_path, "mug/a.stl")
+    cache = MeshCache(tmp_path / "cache", tmp_path, colors=False)
+    entry = cache.make(path)
+    np.savez(entry, header=np.array([Payload()], dtype=object), allow_pickle=True)
+    assert cache.find(path) is None
+    assert not proof.exists()
+    with np.load(entry, allow_pickle=True) as arrays:  # where it is let
+        arrays["header"]
+    assert proof.is_dir()
