@@ -1,4 +1,7 @@
-"""Make the README's table and the figures from the committed result files: ``make results``."""
+"""Make the tables of the README and of docs/metrics.md and the figures from the committed result files.
+
+Run by ``make results``.
+"""
 
 import json
 from pathlib import Path
@@ -10,7 +13,10 @@ from PIL import Image
 
 HERE = Path(__file__).parent
 README = HERE.parent / "README.md"
+METRICS_PAGE = HERE.parent / "docs" / "metrics.md"
 BEGIN, END = "<!-- results:begin -->", "<!-- results:end -->"
+FLOORS = HERE / "floors"
+BASELINES = ("visual_hull", "sgm", "mean_shape", "nearest_shape", "truth")
 SHORT, RECIPE = HERE / "laptop_4k", HERE / "recipe_10k"
 RUNS = {
     SHORT / "mono": "model=mono model.encoder.weights=null steps=4000",
@@ -31,13 +37,36 @@ def table() -> str:
     for folder, settings in RUNS.items():
         test, real = (json.loads((folder / f"{where}.json").read_text()) for where in ("test", "real"))
         metrics = test["metrics"]
-        parts = " / ".join(f"{metrics[f'test/iou/{category}']:.2f}" for category in FIGURE_CATEGORIES)
         lines.append(
-            f"| `{settings}` | {test['parameters'] / 1e6:.1f} M | **{metrics['test/iou']:.3f}** ({parts}) | "
+            f"| `{settings}` | {test['parameters'] / 1e6:.1f} M | {_by_category(metrics)} | "
             f"{metrics['test/iou_bbox']:.3f} | {metrics['test/iou_unrotated']:.3f} | "
             f"{real['metrics']['test/iou']:.3f} ({real['objects']}) |"
         )
     return "\n".join(lines)
+
+
+def floors() -> str:
+    """What needs no training, as a Markdown table."""
+    columns = ("iou_bbox", "iou_unrotated", "chamfer_l1", "f_score_2", "cavity_empty", "handle_recall")
+    lines = [
+        f"| baseline | test `iou` (mug / bowl / bottle) | {' | '.join(f'`{name}`' for name in columns)} | real `iou` |",
+        "|---" * (3 + len(columns)) + "|",
+    ]
+    for name in BASELINES:
+        test, real = (_metrics(FLOORS / name / f"{where}.json") for where in ("test", "real"))
+        values = (f"{test[f'test/{column}']:.3f}" for column in columns)
+        lines.append(f"| `{name}` | {_by_category(test)} | {' | '.join(values)} | {_by_category(real)} |")
+    return "\n".join(lines)
+
+
+def _metrics(path: Path) -> dict[str, float]:
+    metrics: dict[str, float] = json.loads(path.read_text())["metrics"]
+    return metrics
+
+
+def _by_category(metrics: dict[str, float]) -> str:
+    parts = " / ".join(f"{metrics[f'test/iou/{category}']:.2f}" for category in FIGURE_CATEGORIES)
+    return f"**{metrics['test/iou']:.3f}** ({parts})"
 
 
 def curves() -> None:
@@ -69,9 +98,10 @@ def examples(folder: Path) -> None:
 def main() -> None:
     curves()
     examples(RECIPE / "plane_sweep_stereo")
-    text = README.read_text()
-    before, after = text.split(BEGIN)[0], text.split(END)[1]
-    README.write_text(f"{before}{BEGIN}\n{table()}\n{END}{after}")
+    for page, lines in ((README, table()), (METRICS_PAGE, floors())):
+        text = page.read_text()
+        before, after = text.split(BEGIN)[0], text.split(END)[1]
+        page.write_text(f"{before}{BEGIN}\n{lines}\n{END}{after}")
 
 
 if __name__ == "__main__":
