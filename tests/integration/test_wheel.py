@@ -37,6 +37,7 @@ def test_the_wheel_holds_the_whole_package_and_its_configuration(site):
     assert installed == package
     assert files(site, "stereo_occ/conf") == files(CHECKOUT, "conf")
     assert (site / "stereo_occ" / "py.typed").exists()
+    assert (site / "hydra_plugins" / "stereo_occ_search.py").exists()
 
 
 def test_it_composes_shows_and_trains_from_a_foreign_folder(site, tmp_path):
