@@ -21,10 +21,13 @@ $(READY): requirements.lock pyproject.toml
 	$(RUN)/pip install --quiet --no-deps --no-build-isolation -e .
 	@touch $@
 
-demo: $(READY) ## render a small data set, train, evaluate, write meshes and pictures (minutes)
+demo: $(READY) ## a mesh from the example pair with shipped weights; then render, train and evaluate a small model (minutes)
+	@$(RUN)/python -m stereo_occ.reconstruct left=examples/left.png right=examples/right.png \
+		rig=examples/calibration.yaml output=$(DEMO)/mug.glb
 	@$(RUN)/python -m stereo_occ.train scale=smoke queries=mixed hydra.run.dir=$(DEMO)/train resume=never
 	@$(RUN)/python -m stereo_occ.evaluate checkpoint=$(DEMO)/train/best.ckpt points=20000 views=4 hydra.run.dir=$(DEMO)/evaluation
 	@echo
+	@echo "the example pair as a mesh:                 $(DEMO)/mug.glb, its outline: $(DEMO)/mug_preview.png"
 	@echo "pictures (left | right | predicted | true): $(DEMO)/evaluation/pictures"
 	@echo "meshes (GLB):                               $(DEMO)/evaluation/meshes"
 	@echo "metrics:                                    $(DEMO)/evaluation/metrics.json"

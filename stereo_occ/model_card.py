@@ -62,10 +62,22 @@ def training_command(folder: Path) -> str | None:
 
 
 def _table(metrics: Mapping[str, Any]) -> list[str]:
+    """A row per metric: its mean over categories, and each of them."""
+    values = {
+        tuple(key.split("/")[1:]): value
+        for key, value in metrics.items()
+        if "/" in key and isinstance(value, int | float)
+    }
+    names = list(dict.fromkeys(name for name, *_ in values))
+    categories = list(dict.fromkeys(rest[0] for _, *rest in values if rest and rest[0] != "all"))
+    if not names:
+        return ["Not evaluated."]
+    cells = [[values.get(key) for key in ((name,), *((name, c) for c in categories))] for name in names]
     rows = [
-        f"| `{name}` | {value:.4f} |" for name, value in metrics.items() if isinstance(value, int | float)
+        " | ".join([f"| `{name}`", *("" if value is None else f"{value:.4g}" for value in row)]) + " |"
+        for name, row in zip(names, cells, strict=True)
     ]
-    return ["| metric | value |", "|---|---|", *rows] if rows else ["Not evaluated."]
+    return [" | ".join(["| metric", "mean", *categories]) + " |", "|---" * (2 + len(categories)) + "|", *rows]
 
 
 def _rig_limits(config: Mapping[str, Any]) -> list[str]:

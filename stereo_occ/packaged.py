@@ -30,6 +30,9 @@ from stereo_occ.writing import write_whole
 #: What is shipped.
 FOLDER = PACKAGE / "weights"
 
+#: The shipped weights for photographs.
+DEFAULT = "field"
+
 SUFFIX = ".safetensors"
 
 #: Of the JSON file's form.

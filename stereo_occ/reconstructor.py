@@ -21,6 +21,7 @@ from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import transform_points
 from stereo_occ.mesh_output import simplified
 from stereo_occ.models.base import StereoViews
+from stereo_occ.packaged import DEFAULT
 from stereo_occ.photographs.color import vertex_colors
 from stereo_occ.photographs.framing import Framing, frame_on_fixation, frame_on_object
 from stereo_occ.photographs.given import SIDES, ImageFile, Pair, locate_pair, photo_of
@@ -136,7 +137,7 @@ class Reconstructor:
 
     @classmethod
     def from_checkpoint(
-        cls, checkpoint: str | Path, backend: str = "torch", threads: int | None = None
+        cls, checkpoint: str | Path = DEFAULT, backend: str = "torch", threads: int | None = None
     ) -> Self:
         """Of a run's ``best.ckpt``, exported ``.safetensors``, or the name of shipped weights.
 

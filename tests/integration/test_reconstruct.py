@@ -194,7 +194,7 @@ def test_the_card_has_the_metrics_and_the_command(checkpoint, tmp_path):
     (run / "overrides.yaml").write_text("- model=stereo\n- steps=12\n")
     export(compose_config("export", [f"checkpoint='{run / 'best.ckpt'}'", f"output='{tmp_path / 'x'}'"]))
     card = (tmp_path / "x.md").read_text()
-    assert "| `test/iou` | 0.5000 |" in card
+    assert "| `iou` | 0.5 |" in card
     assert "python -m stereo_occ.train model=stereo steps=12" in card
 
 
