@@ -122,7 +122,7 @@ def _folder(cfg: DictConfig) -> Iterator[str]:
         yield f"data.root={cfg.data.root}: no such folder; give the folder of the meshes"
     if not cfg.data.time_limit > 0:
         yield f"data.time_limit={cfg.data.time_limit}: must be above 0 seconds"
-    if not 1 <= cfg.data.memory_limit:
+    if not cfg.data.memory_limit >= 1:
         yield f"data.memory_limit={cfg.data.memory_limit}: must be at least 1 GB"
 
 

@@ -336,7 +336,10 @@ TRAININGS = [
 COMPARISONS = [
     Case("a missing result", r"none: no such folder; give the folder of an evaluation", ["none", "none"]),
     Case("a folder without a result", r"a.*metrics\.json", ["a", "a"], folder_called("a")),
-    Case("a broken result", r"a.*metrics\.json",
-         ["a", "a"], chain(folder_called("a"), content("a/metrics.json", "{"))),
+    Case(
+        "a broken result",
+        r"a.*metrics\.json",
+        ["a", "a"],
+        chain(folder_called("a"), content("a/metrics.json", "{")),
+    ),
 ]
-

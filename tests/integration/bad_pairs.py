@@ -167,7 +167,8 @@ IMAGES = [
          [BOXES[0], "right_box=[300,200,505,580]"]),
     Case("NaN in a box", r"left_box=.*: must have left < right", ["left_box=[nan,200,410,380]", BOXES[1]]),
     Case("infinity in a box", r"left_box=.*: reaches out of", ["left_box=[-inf,200,410,380]", BOXES[1]]),
-    Case("words in a box", r"left_box=\[a,b,c,d\]: must be a list in brackets|must be numbers", ["left_box=[a,b,c,d]", BOXES[1]]),
+    Case("words in a box", r"left_box=\[a,b,c,d\]: must be a list in brackets|must be numbers",
+         ["left_box=[a,b,c,d]", BOXES[1]]),
     Case("boxes of different things", r"boxes: their rays meet behind the cameras",
          ["left_box=[10,200,60,380]", "right_box=[700,200,750,380]"]),
 ]  # fmt: skip
