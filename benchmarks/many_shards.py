@@ -27,7 +27,7 @@ def open_files() -> int:
 
 def pairs_of(paths: list[Path]) -> TrainingPairs:
     """Each with one view."""
-    return TrainingPairs([Shard(path) for path in paths], [0], QueriesConfig(1.0, 0.0, 0.0), 256, seed=0)
+    return TrainingPairs([Shard(path) for path in paths], [0], QueriesConfig(1.0, 0.0, 0.0), 32, seed=0)
 
 
 def read(pairs: TrainingPairs, steps: int) -> tuple[float, int]:
