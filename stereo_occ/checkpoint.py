@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +79,21 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     return _checked(checkpoint, path)
 
 
+def config_of(checkpoint: Mapping[str, Any], name: object) -> DictConfig:
+    """The typed training configuration of a checkpoint that was read.
+
+    Args:
+        name: of the checkpoint, for messages.
+
+    Raises:
+        UserError: see :func:`~stereo_occ.config.training_config`.
+    """
+    try:
+        return training_config(checkpoint[KEY].get("config"))
+    except UserError as error:
+        raise UserError(f"checkpoint={name}: {error}") from error
+
+
 def _is_as_written(path: Path) -> bool:
     """Whether all that torch will read agrees with the checksums that it has written but does not read.
 
@@ -102,8 +118,4 @@ def _checked(checkpoint: Any, path: Path) -> dict[str, Any]:
         raise UserError(
             f"checkpoint={path}: has format version {ours.get('version')}, expected {VERSION}; train it again"
         )
-    try:
-        training_config(ours.get("config"))
-    except UserError as error:
-        raise UserError(f"checkpoint={path}: {error}") from error
     return dict(checkpoint)

@@ -5,6 +5,7 @@ Each YAML file lists its schema (``base_...``) first, so that unknown keys and w
 
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cache
 from typing import Any
 
 from hydra.core.config_store import ConfigStore
@@ -256,6 +257,7 @@ def _refers(value: Any) -> bool:
     return isinstance(value, str) and "${" in value
 
 
+@cache
 def register_schemas() -> None:
     """Tell Hydra the schemas, and OmegaConf two resolvers; safe to call again.
 

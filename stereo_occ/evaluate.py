@@ -31,10 +31,10 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.baselines.build import build_baseline
-from stereo_occ.checkpoint import KEY, build_task, plain, read_checkpoint
+from stereo_occ.checkpoint import KEY, build_task, config_of, plain, read_checkpoint
 from stereo_occ.checks import check_evaluation
 from stereo_occ.cli import compose_config, entry_point
-from stereo_occ.config import EvaluateConfig, training_config
+from stereo_occ.config import EvaluateConfig
 from stereo_occ.errors import UserError
 from stereo_occ.evaluation_data import (
     GROUPS,
@@ -72,7 +72,7 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
         torch.set_num_threads(settings.trainer.threads)
     checkpoint = read_checkpoint(Path(settings.checkpoint)) if settings.checkpoint else None
     trained = (
-        training_config(checkpoint[KEY]["config"])
+        config_of(checkpoint, settings.checkpoint)
         if checkpoint
         else compose_config("train", settings.training)
     )

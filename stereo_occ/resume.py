@@ -8,8 +8,7 @@ from lightning.fabric.plugins import TorchCheckpointIO
 from lightning.pytorch import LightningModule, Trainer
 from lightning.pytorch.callbacks import Checkpoint
 
-from stereo_occ.checkpoint import KEY, plain, read_checkpoint
-from stereo_occ.config import training_config
+from stereo_occ.checkpoint import config_of, plain, read_checkpoint
 from stereo_occ.errors import UserError
 from stereo_occ.writing import whole_file
 
@@ -95,7 +94,7 @@ def step_to_resume(checkpoint: Path, config: dict[str, Any]) -> int:
         saved = read_checkpoint(checkpoint)
     except UserError as error:
         raise UserError(f"{error}; or copy best.ckpt over it, or say resume=never to start over") from error
-    former = plain(training_config(saved[KEY]["config"]))
+    former = plain(config_of(saved, checkpoint))
     changed = [name for name in FIXED if former[name] != config[name]]
     if changed:
         raise UserError(

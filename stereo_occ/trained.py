@@ -6,8 +6,8 @@ from pathlib import Path
 
 from omegaconf import OmegaConf
 
-from stereo_occ.checkpoint import KEY, plain, read_checkpoint
-from stereo_occ.config import TrainConfig, training_config
+from stereo_occ.checkpoint import config_of, plain, read_checkpoint
+from stereo_occ.config import TrainConfig
 from stereo_occ.data.rigs import build_rig
 from stereo_occ.errors import UserError
 from stereo_occ.models.base import OccupancyModel, StereoViews
@@ -53,7 +53,7 @@ def load_trained(name: str) -> TrainedModel:
             f"({', '.join(shipped()) or 'there are none'}); give the best.ckpt of a training run"
         )
     checkpoint = read_checkpoint(Path(name))
-    cfg = training_config(checkpoint[KEY]["config"])
+    cfg = config_of(checkpoint, name)
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
     model = build_model(plain(cfg.model), build_rig(typed.rig, typed.data.image_side), load_weights=False)
