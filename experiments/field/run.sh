@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# The weights for photographs: half of the schedule of experiment=field, measured on test objects and, where REAL names
+# a folder of them, on real ones with their own colours, in the same scenes. Results go beside this file.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+here=experiments/field run=outputs/field
+export OMP_NUM_THREADS=1
+
+measure() { # where, overrides
+    where=$1; shift
+    .venv/bin/python -m stereo_occ.evaluate checkpoint="$run/best.ckpt" views=4 points=20000 meshes=1 mesh_resolution=64 \
+        surface_points=20000 examples=3 trainer.threads=1 hydra.run.dir="$run/${where}_best" progress=false "$@"
+}
+
+.venv/bin/python -m stereo_occ.train experiment=field steps=10000 trainer.threads=1 hydra.run.dir="$run" progress=false
+measure test
+if [ -n "${REAL:-}" ]; then
+    measure real data=meshes data.root="$REAL" data.views=4 texture=own
+fi
+.venv/bin/python experiments/collect.py "$run" "$here"
+if [ -n "${REAL:-}" ]; then
+    sed -i "s|$REAL|REAL|" "$here/real.json"
+fi
+.venv/bin/python -m stereo_occ.export checkpoint="$run/best.ckpt" output=stereo_occ/weights/field metrics="$here/test.json"
