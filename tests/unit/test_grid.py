@@ -26,7 +26,7 @@ def test_in_the_working_cube_the_coordinates_are_those_of_the_rig():
 
 
 def test_the_loss_is_zero_for_the_cube_around_the_occupied_points_alone():
-    points = torch.rand(2, 300, 3) - 0.5
+    points = torch.rand(2, 3000, 3) - 0.5
     occupied = (points[..., 0].abs() < 0.2).float() * (points[..., 1:].abs() < 0.1).all(dim=-1)
     boxes = [points[i][occupied[i] > 0] for i in range(2)]
     center = torch.stack([(box.amin(0) + box.amax(0)) / 2 for box in boxes])
