@@ -21,6 +21,7 @@ SHORT, RECIPE = HERE / "laptop_4k", HERE / "recipe_10k"
 RUNS = {
     SHORT / "mono": "model=mono model.encoder.weights=null steps=4000",
     SHORT / "stereo": "model=stereo steps=4000",
+    RECIPE / "mono_scratch": "experiment=recipe model=mono_scratch steps=10000",
     RECIPE / "plane_sweep_stereo": "experiment=recipe model=plane_sweep_stereo steps=10000",
 }
 METRICS = {"iou": "-", "iou_bbox": "--", "iou_unrotated": ":"}
