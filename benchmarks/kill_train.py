@@ -7,6 +7,7 @@ tells the data that it saw), best.ckpt.
 
 import argparse
 import json
+import logging
 import random
 import signal
 import subprocess
@@ -20,6 +21,8 @@ import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from stereo_occ.provenance import environment
+
+logging.getLogger("tensorboard").setLevel(logging.ERROR)  # a resumed run purges what the killed part had logged
 
 #: A run of seconds with every part that has a state: moving average, schedule, augmentation, auxiliary heads.
 RUN = [
