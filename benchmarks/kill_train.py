@@ -22,7 +22,8 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from stereo_occ.provenance import environment
 
-logging.getLogger("tensorboard").setLevel(logging.ERROR)  # a resumed run purges what the killed part had logged
+# A resumed run purges what the killed part had logged, and says so.
+logging.getLogger("tensorboard").setLevel(logging.ERROR)
 
 #: A run of seconds with every part that has a state: moving average, schedule, augmentation, auxiliary heads.
 RUN = [
