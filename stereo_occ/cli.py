@@ -78,6 +78,7 @@ def entry_point(
         )
 
         def main() -> None:
+            failures.clear()  # of an earlier call in the same process
             sys.argv[1:] = [_by_key(argument, aliases or {}) for argument in sys.argv[1:]]
             arguments = get_args_parser().parse_args()
             try:

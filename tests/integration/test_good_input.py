@@ -180,3 +180,10 @@ def test_it_is_taken(case, command, usual):
         np.testing.assert_allclose(mesh.vertices, usual.vertices, atol=case.tolerance)
     else:
         np.testing.assert_allclose(mesh.bounds, usual.bounds, atol=case.tolerance)
+
+
+def test_a_mistake_does_not_outlive_its_call(command):
+    """Several commands of one process, as a notebook runs them: each has its own exit code."""
+    (command.folder / "broken.png").write_bytes(b"no picture")
+    assert command("reconstruct", [f"{key}={value}" for key, value in (GIVEN | {"left": "broken.png"}).items()]).code == 2
+    reconstructed(command, {})
