@@ -2,6 +2,7 @@
 
     python -m benchmarks.training_step --threads 2
 
+The floor is the step's operations, forward and back, at the rate of one large bf16 matrix product on as many threads.
 Every way runs in a process of its own; the processes take turns, one step each, so that whatever else the machine does
 hits them alike. Ours reads shards and trains as ``stereo_occ.train`` does; the reference is ``reference_step``.
 """
@@ -22,6 +23,7 @@ import numpy as np
 import torch
 from omegaconf import DictConfig, OmegaConf
 from torch.nn.functional import binary_cross_entropy_with_logits
+from torch.utils.flop_counter import FlopCounterMode
 from tqdm import tqdm
 
 from benchmarks.reference_step import ConvONet, export_npz, npz_batches
@@ -43,6 +45,7 @@ MODELS = {
 WAYS = ("reference", "fp32", "bf16")
 WARM_UP = 4  # steps
 STEPS = 40_000  # of the paper's schedule
+MATRIX = 2048  # rows and columns of the product that tells the rate
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,25 @@ def our_data(cfg: DictConfig) -> PairsDataModule:
     return build_data(typed)
 
 
+def matrix_rate(threads: int) -> float:
+    """Operations per millisecond of a bf16 matrix product, the best of ten."""
+    torch.set_num_threads(threads)
+    a, b = torch.randn(2, MATRIX, MATRIX).to(torch.bfloat16)
+    times = []
+    for _ in range(10):
+        start = time.perf_counter()
+        a @ b
+        times.append(1000 * (time.perf_counter() - start))
+    return 2 * MATRIX**3 / min(times)
+
+
+def operations(task: Task) -> int:
+    """Of the matrix products and convolutions of one step."""
+    with FlopCounterMode(display=False) as counter:
+        next(training_steps(task))
+    return counter.get_total_flops()
+
+
 def measure(tasks: list[Task], steps: int, label: str) -> list[tuple[float, float]]:
     """Median milliseconds and peak MB of each task, with the steps of all in turn."""
     context = multiprocessing.get_context("spawn")
@@ -142,18 +164,19 @@ def main() -> None:
         export_npz(data.subset("train")[0], Path(folder) / "npz")
         print(
             f"{'model':<20} {'reference':>9} {'fp32':>5} {'bf16':>5}  ms   "
-            f"{'fp32':>5} {'bf16':>5} times   MB        40,000 steps in bf16"
+            f"{'fp32':>5} {'bf16':>5} times   MB        40,000 steps in bf16   floor"
         )
         for name in options.models:
             tasks = [Task(MODELS[name] + common, way, options.threads, Path(folder) / "npz") for way in WAYS]
+            floor = operations(tasks[-1]) / matrix_rate(options.threads)
             (reference, most), (fp32, _), (bf16, least) = measure(tasks, options.steps, name)
             print(
                 f"{name:<20} {reference:>9.0f} {fp32:>5.0f} {bf16:>5.0f}      "
                 f"{reference / fp32:>5.1f} {reference / bf16:>5.1f}         {most:.0f} to {least:.0f}  "
-                f"{STEPS * bf16 / 60_000:>5.0f} min",
+                f"{STEPS * bf16 / 60_000:>5.0f} min  {floor:>17.0f} ms",
                 flush=True,
             )
-            figures[name] = {"reference_ms": reference, "fp32_ms": fp32, "bf16_ms": bf16}
+            figures[name] = {"reference_ms": reference, "fp32_ms": fp32, "bf16_ms": bf16, "floor_ms": floor}
     if options.output:
         options.output.write_text(json.dumps({"threads": options.threads, **figures}, indent=2) + "\n")
 

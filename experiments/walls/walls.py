@@ -1,0 +1,90 @@
+"""How far off a predicted wall is: the IoU of every test object beside the thickness of its walls.
+
+    python experiments/walls/walls.py DATA_FOLDER
+
+DATA_FOLDER holds the shards that the models of ``experiments/recipe_10k`` were measured on. A wall of thickness t whose
+prediction, as thick, lies e beside it has an IoU of (t - e) / (t + e), so an IoU of q says e = t (1 - q) / (1 + q). The
+thickness is twice the volume over the area, which for a solid is a measure of its size. Writes ``walls.csv`` and
+``walls.json`` beside this file and draws ``walls.png``.
+"""
+
+import csv
+import json
+import sys
+from collections import defaultdict
+from math import radians, tan
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from stereo_occ.data.shard import Shard
+
+HERE = Path(__file__).parent
+MODELS = {"mono_scratch": "mono", "plane_sweep_stereo": "plane sweep"}
+MARKERS = {"mug": "o", "bowl": "s", "bottle": "^"}
+PIXEL = 2 * tan(radians(30)) / 64  # metres on the plane through the object, at 1 m
+SOLID = 4.0  # pixels; what is thicker is no wall
+
+
+def iou_per_object(model: str) -> dict[tuple[str, str], float]:
+    """Mean over the views of each test object, by category and name."""
+    values = defaultdict(list)
+    path = HERE.parent / "recipe_10k" / model / "test_per_object.csv"
+    with path.open(newline="") as file:
+        for row in csv.DictReader(file):
+            values[row["category"], row["object_id"]].append(float(row["iou"]))
+    return {key: float(np.mean(views)) for key, views in values.items()}
+
+
+def thickness(shard: Path) -> float:
+    """Of an object's walls in the paper's placement, pixels."""
+    with Shard(shard) as opened:
+        mesh = opened.mesh
+    unit = np.linalg.norm(mesh.extents)
+    return float(2 * mesh.volume / mesh.area / unit / PIXEL)
+
+
+def offset(pixels_N: np.ndarray, iou_N: np.ndarray) -> float:
+    """Median over objects of how far the wall is off, pixels."""
+    return float(np.median(pixels_N * (1 - iou_N) / (1 + iou_N)))
+
+
+def main(data: Path) -> None:
+    ious = {model: iou_per_object(model) for model in MODELS}
+    objects = sorted(ious["plane_sweep_stereo"])
+    pixels_N = np.array([thickness(data / category / f"{name}.h5") for category, name in objects])
+    with (HERE / "walls.csv").open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["category", "object_id", "wall_px", *(f"iou_{model}" for model in MODELS)])
+        for (category, name), pixels in zip(objects, pixels_N, strict=True):
+            values = (f"{ious[model][category, name]:.4f}" for model in MODELS)
+            writer.writerow([category, name, f"{pixels:.3f}", *values])
+    walls_N = pixels_N < SOLID
+    category_N = np.array([category for category, _ in objects])
+    figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
+    found: dict[str, dict[str, float]] = {}
+    for color, (model, label) in enumerate(MODELS.items()):
+        iou_N = np.array([ious[model][key] for key in objects])
+        found[model] = {"wall_off_px": offset(pixels_N[walls_N], iou_N[walls_N])}
+        for category in MARKERS:
+            chosen_N = walls_N & (category_N == category)
+            found[model][f"wall_off_px/{category}"] = offset(pixels_N[chosen_N], iou_N[chosen_N])
+            found[model][f"iou/{category}"] = float(iou_N[chosen_N].mean())
+        found[model]["iou/solid"] = float(iou_N[~walls_N].mean())
+        for category, marker in MARKERS.items():
+            of_N = category_N == category
+            axis.scatter(pixels_N[of_N], iou_N[of_N], s=18, marker=marker, color=f"C{color}", alpha=0.7, label=f"{label}, {category}")
+    line_N = np.geomspace(0.5, 12, 100)
+    for off in (0.1, 0.25, 0.5, 1.0):
+        axis.plot(line_N, np.clip((line_N - off) / (line_N + off), 0, 1), color="0.6", lw=0.8)
+        axis.annotate(f"{off} px", (12, (12 - off) / (12 + off)), fontsize=7, color="0.4", va="center")
+    axis.set(xscale="log", xlabel="thickness of the walls, pixels of the 64", ylabel="iou, mean of 8 poses", ylim=(0, 1))
+    axis.legend(fontsize=7)
+    figure.savefig(HERE / "walls.png", dpi=110)
+    found["objects"] = {"walls": int(walls_N.sum()), "solid": int((~walls_N).sum())}
+    (HERE / "walls.json").write_text(json.dumps(found, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
