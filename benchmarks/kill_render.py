@@ -1,4 +1,4 @@
-"""Kill a rendering at random moments until it is done, and compare every byte with renderings left alone.
+"""Kill renderings at random moments until they are done, and compare every byte with renderings left alone.
 
 Half of the kills hit the command alone, half it and its rendering processes; both are SIGKILL.
 """
@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 from stereo_occ.provenance import environment
 
@@ -45,6 +46,49 @@ def shards(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.rglob("*.h5")}
 
 
+class Rendering:
+    """One data set that is rendered by as many processes as it takes.
+
+    Attributes:
+        redone: shards that were there and were written again.
+    """
+
+    def __init__(self, folder: Path, overrides: list[str]) -> None:
+        self.folder, self.overrides = folder, overrides
+        self.redone = 0
+        self.before: dict[Path, int] = {}
+        self.began = self.seconds = 0.0
+
+    def go_on(self, wait_for_work: bool) -> None:
+        """Start the command; ``wait_for_work``: come back when it writes its first file, or has ended."""
+        self.before, self.began = shards(self.folder), time.perf_counter()
+        self.process = start(self.folder, self.overrides, 2)
+        while wait_for_work and self.process.poll() is None and not self._writes():
+            time.sleep(0.02)
+
+    def kill_within(self, seconds: float, group: bool) -> bool:
+        """Kill the command, or its whole process group, unless it ends before."""
+        try:
+            self.process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            (os.killpg if group else os.kill)(self.process.pid, signal.SIGKILL)
+            self.process.communicate()
+            self.seconds = time.perf_counter() - self.began
+            time.sleep(1)  # the rendering processes end with the command
+            return True
+        return False
+
+    def left(self) -> dict[str, Any]:
+        """What the command left."""
+        after = shards(self.folder)
+        self.redone += sum(after[path] != written for path, written in self.before.items())
+        partial = len(list(self.folder.rglob("*.part")))
+        return {"seconds": round(self.seconds, 1), "shards": len(after), "partial": partial}
+
+    def _writes(self) -> bool:
+        return any(path.name.startswith(".") for path in self.folder.rglob("*.part"))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=20)
@@ -57,7 +101,7 @@ def main() -> None:
     overrides = [f"scale.counts={{{counts}}}", f"data.views={options.views}"]
     rng = random.Random(options.seed)
     with tempfile.TemporaryDirectory() as root:
-        seconds, renderings = [], []
+        seconds, renderings, redone = [], [], 0
         for workers in (1, 2, 3):
             folder = Path(root) / f"alone_{workers}"
             began = time.perf_counter()
@@ -69,32 +113,31 @@ def main() -> None:
             f"left alone, workers 1, 2, 3: {len(renderings[0])} files, {'identical' if same else 'DIFFERENT'}"
         )
 
-        folder = Path(root) / "killed"
-        redone, rows = 0, []
-        print(f"{'kill':>4} {'after s':>8} {'whom':>8} {'shards':>7} {'partial files':>14}")
-        for kill in range(options.kills):
-            before = shards(folder)
-            process = start(folder, overrides, 2)
-            wait = rng.uniform(0, 0.6 * seconds[1])
-            time.sleep(wait)
+        killed = Rendering(Path(root) / "killed_0", overrides)
+        within, ended = seconds[1], 0
+        rows: list[dict[str, Any]] = []
+        print(f"{'kill':>4} {'run':>4} {'after s':>8} {'whom':>8} {'shards':>7} {'partial files':>14}")
+        while len(rows) < options.kills or killed.folder.exists():
+            killed.go_on(wait_for_work=rng.random() >= 0.15)
             group = rng.random() < 0.5
-            (os.killpg if group else os.kill)(process.pid, signal.SIGKILL)
-            process.communicate()
-            time.sleep(1)  # the rendering processes end with the command
-            after = shards(folder)
-            redone += sum(after[path] != written for path, written in before.items())
-            partial = len(list(folder.rglob("*.part")))
-            whom = "group" if group else "command"
-            rows.append({"seconds": round(wait, 1), "whom": whom, "shards": len(after), "partial": partial})
-            print(f"{kill + 1:>4} {wait:>8.1f} {whom:>8} {len(after):>7} {partial:>14}", flush=True)
-        before = shards(folder)
-        finish(start(folder, overrides, 2))
-        redone += sum(shards(folder)[path] != written for path, written in before.items())
-        same = same and files(folder) == renderings[0]
-        print(f"in the end {'identical' if same else 'DIFFERENT'}; {redone} finished objects rendered again")
+            if len(rows) < options.kills and killed.kill_within(rng.uniform(0, within), group):
+                row = {"run": ended, "whom": "group" if group else "command"} | killed.left()
+                rows.append(row)
+                print(f"{len(rows):>4} {ended:>4} {row['seconds']:>8.1f} {row['whom']:>8} {row['shards']:>7} "
+                      f"{row['partial']:>14}", flush=True)  # fmt: skip
+                continue
+            finish(killed.process)
+            killed.left()
+            same = same and files(killed.folder) == renderings[0]
+            redone += killed.redone
+            ended, within = ended + 1, max(1.0, 0.7 * within)  # the machine is faster than it was
+            killed = Rendering(Path(root) / f"killed_{ended}", overrides)
+        print(f"in the end {'identical' if same else 'DIFFERENT'}, {ended} runs; "
+              f"{redone} finished objects rendered again")  # fmt: skip
         if options.output:
             content = {
                 "files": len(renderings[0]),
+                "runs": ended,
                 "kills": rows,
                 "identical": same,
                 "rendered again": redone,

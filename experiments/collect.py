@@ -12,11 +12,11 @@ def main(run: Path, destination: Path) -> None:
     shutil.copy(run / "config.yaml", destination)
     shutil.copy(run / "metrics.json", destination / "training.json")
     curve: dict[int, dict[str, Any]] = {}
+    for best in run.glob("*_best"):
+        where = best.name.removesuffix("_best")
+        shutil.copy(best / "metrics.json", destination / f"{where}.json")
+        shutil.copy(best / "per_object.csv", destination / f"{where}_per_object.csv")
     for where in ("test", "real"):
-        best = run / f"{where}_best"
-        if best.is_dir():
-            shutil.copy(best / "metrics.json", destination / f"{where}.json")
-            shutil.copy(best / "per_object.csv", destination / f"{where}_per_object.csv")
         for path in (run / where).glob("*/metrics.json"):
             measured = json.loads(path.read_text())
             curve.setdefault(measured["step"], {})[where] = measured["metrics"]

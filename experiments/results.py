@@ -1,8 +1,10 @@
-"""Make the tables of the README and of docs/metrics.md and the figures from the committed result files.
+"""Make ``results.json``, the tables of the README and the docs and the figures from the committed result files.
 
-Run by ``make results``.
+Run by ``make results``. ``results.json`` has of every run ``[value, low, high]`` of its metrics per category and
+macro, with the 95 % interval of the bootstrap over objects, and the paired difference from mono on the same recipe.
 """
 
+import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -11,19 +13,26 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
+from stereo_occ.metrics.statistics import Difference, paired_bootstrap
+
 HERE = Path(__file__).parent
 README = HERE.parent / "README.md"
 METRICS_PAGE = HERE.parent / "docs" / "metrics.md"
 BEGIN, END = "<!-- results:begin -->", "<!-- results:end -->"
 FLOORS = HERE / "floors"
 BASELINES = ("visual_hull", "sgm", "mean_shape", "nearest_shape", "truth")
-SHORT, RECIPE = HERE / "laptop_4k", HERE / "recipe_10k"
+SHORT, RECIPE, FIELD = HERE / "laptop_4k", HERE / "recipe_10k", HERE / "field"
 RUNS = {
     SHORT / "mono": "model=mono model.encoder.weights=null steps=4000",
     SHORT / "stereo": "model=stereo steps=4000",
     RECIPE / "mono_scratch": "experiment=recipe model=mono_scratch steps=10000",
     RECIPE / "plane_sweep_stereo": "experiment=recipe model=plane_sweep_stereo steps=10000",
 }
+MONO = RECIPE / "mono_scratch"
+WITH_INTERVALS = (
+    "iou", "iou_bbox", "iou_unrotated", "handle_recall", "neck_recall", "cavity_empty", "chamfer_l1",
+    "height_error", "width_error",
+)  # fmt: skip
 METRICS = {"iou": "-", "iou_bbox": "--", "iou_unrotated": ":"}
 FIGURE_CATEGORIES = ("mug", "bowl", "bottle")
 
@@ -44,6 +53,49 @@ def table() -> str:
             f"{real['metrics']['test/iou']:.3f} ({real['objects']}) |"
         )
     return "\n".join(lines)
+
+
+def summary() -> dict[str, Any]:
+    """Every run's metrics with their intervals, and what it has over mono."""
+    runs: dict[str, Any] = {}
+    for folder in (*(folder for folder in RUNS if folder.parent == RECIPE), FIELD):
+        run: dict[str, Any] = {"settings": RUNS.get(folder, "experiment=field")}
+        for where in ("test", "real"):
+            facts = json.loads((folder / f"{where}.json").read_text())
+            run |= {"parameters": facts["parameters"]}
+            run[where] = {"objects": facts["objects"], "metrics": _differences(folder, None, where)}
+            if folder.parent == RECIPE and folder != MONO:
+                run[where]["over mono_scratch"] = _differences(folder, MONO, where)
+        runs[str(folder.relative_to(HERE))] = run
+    return runs
+
+
+def _differences(folder: Path, other: Path | None, where: str) -> dict[str, dict[str, list[float | None]]]:
+    """Of each metric ``folder`` less ``other``, or itself, per category and macro: value, low, high."""
+    ours = _rows(folder / f"{where}_per_object.csv")
+    theirs = None if other is None else _rows(other / f"{where}_per_object.csv")
+    found: dict[str, dict[str, list[float | None]]] = {}
+    for metric in WITH_INTERVALS:
+        keys = [key for key, row in ours.items() if row.get(metric)]
+        if not keys:
+            continue
+        a_1V = np.array([[float(ours[key][metric]) for key in keys]])
+        b_1V = np.zeros_like(a_1V)
+        if theirs is not None:
+            b_1V = np.array([[float(theirs[key][metric]) for key in keys]])
+        differences = paired_bootstrap(a_1V, b_1V, [key[0] for key in keys], [key[1] for key in keys])
+        found[metric] = {name: _rounded(difference) for name, difference in differences.items()}
+    return found
+
+
+def _rows(path: Path) -> dict[tuple[str, str, str], dict[str, str]]:
+    """By category, object and view."""
+    with path.open(newline="") as file:
+        return {(row["category"], row["object_id"], row["view"]): row for row in csv.DictReader(file)}
+
+
+def _rounded(value: Difference) -> list[float | None]:
+    return [None if x is None else round(x, 4) for x in (value.difference, value.low, value.high)]
 
 
 def floors() -> str:
@@ -97,6 +149,7 @@ def examples(folder: Path) -> None:
 
 
 def main() -> None:
+    (HERE / "results.json").write_text(json.dumps(summary(), indent=1) + "\n")
     curves()
     examples(RECIPE / "plane_sweep_stereo")
     for page, lines in ((README, table()), (METRICS_PAGE, floors())):

@@ -21,7 +21,7 @@ from stereo_occ.group import started_elsewhere
 from stereo_occ.loggers.config import LoggerConfig, logger_problems
 from stereo_occ.models.build import build_model
 from stereo_occ.optimization import OPTIMIZERS, SCHEDULES
-from stereo_occ.packaged import find_weights
+from stereo_occ.packaged import find_weights, shipped
 from stereo_occ.problems import nearest
 from stereo_occ.shapes.shape import CATEGORIES
 
@@ -242,6 +242,11 @@ def _settings(cfg: DictConfig) -> Iterator[str]:
     for key in ("optimizer.lr", "trainer.gradient_clip"):
         if _value(cfg, key) is not None and not 0 < _value(cfg, key) < inf:
             yield f"{key}={_value(cfg, key)}: must be above 0 and finite"
+    if cfg.init is not None and not (Path(cfg.init).is_file() or find_weights(cfg.init)):
+        yield (
+            f"init={cfg.init}: no such file, nor the name of shipped weights ({', '.join(shipped())}); "
+            f"give the best.ckpt of a training run"
+        )
     if not isfinite(cfg.optimizer.weight_decay):
         yield f"optimizer.weight_decay={cfg.optimizer.weight_decay}: must be at least 0 and finite"
     shares = [cfg.queries.box, cfg.queries.outside, cfg.queries.surface]

@@ -165,6 +165,7 @@ class TrainConfig(PairsConfig):
     validation: ValidationConfig = MISSING
     trainer: TrainerConfig = MISSING
     logger: LoggerConfig = MISSING
+    init: str | None = None  # checkpoint or weights to begin with
     seed: int = MISSING
     steps: int = MISSING
     points: int = MISSING

@@ -15,7 +15,7 @@ from stereo_occ.writing import whole_file
 #: What must not change between the parts of a run. Hardware, logging and the length of the run may.
 FIXED = (
     "data", "rig", "placement", "lights", "material", "texture", "background", "sensor", "categories",
-    "model", "control", "augmentation", "auxiliary", "averaging", "queries", "optimizer",
+    "model", "init", "control", "augmentation", "auxiliary", "averaging", "queries", "optimizer",
     "seed", "points", "batch_size",
 )  # fmt: skip
 

@@ -26,6 +26,7 @@ from stereo_occ.metrics_file import WriteMetrics, best_iou
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.resume import AtomicCheckpoints, SaveLatest, step_to_resume
 from stereo_occ.run_folder import OVERRIDES
+from stereo_occ.trained import begin_with
 from stereo_occ.writing import write_whole
 
 METRICS_FILE = "metrics.json"
@@ -47,7 +48,9 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
     resume = typed.resume is Resume.auto and latest.exists()
     step = step_to_resume(latest, plain(cfg)) if resume else 0
     lightning.seed_everything(typed.seed, verbose=False)
-    task = build_task(cfg, load_weights=not resume)
+    task = build_task(cfg, load_weights=not resume and typed.init is None)
+    if typed.init is not None and not resume:
+        begin_with(typed.init, task.model, plain(cfg)["model"])
     data = build_data(typed)
     boards: list[Board] = []
     if is_first():

@@ -1,8 +1,9 @@
 """A trained model with what it needs to know of its training, ready to answer."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
+from typing import Any
 
 from omegaconf import OmegaConf
 
@@ -72,3 +73,35 @@ def load_trained(name: str) -> TrainedModel:
             f"checkpoint={name}: holds NaN or infinite numbers, so its training has diverged; use one of before"
         )
     return TrainedModel(model.eval(), typed, threshold, step, name)
+
+
+def begin_with(name: str, model: OccupancyModel, config: Mapping[str, Any]) -> None:
+    """Give a fresh model the weights of a trained one.
+
+    Args:
+        name: as for :func:`load_trained`.
+        config: of the fresh model.
+
+    Raises:
+        UserError: they cannot be read, or are of another model.
+    """
+    try:
+        trained = load_trained(name)
+    except UserError as error:
+        raise UserError(f"init: {error}") from error
+    theirs, ours = _leaves(trained.config.model), _leaves(config)
+    other = sorted(
+        key for key in theirs | ours if theirs.get(key) != ours.get(key) and key != ".encoder.weights"
+    )
+    if other:
+        says = ", ".join(f"model{key}={theirs.get(key)}" for key in other)
+        raise UserError(f"init={name}: is of another model; say {says}, or leave init out")
+    model.load_state_dict(trained.model.state_dict())
+
+
+def _leaves(config: Any, key: str = "") -> dict[str, Any]:
+    """The plain values of nested settings by their dotted keys."""
+    values = asdict(config) if is_dataclass(config) and not isinstance(config, type) else config
+    if not isinstance(values, Mapping):
+        return {key: values}
+    return {leaf: v for name, part in values.items() for leaf, v in _leaves(part, f"{key}.{name}").items()}

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The weights for photographs: half of the schedule of experiment=field, measured on test objects and, where REAL names
-# a folder of them, on real ones with their own colours, in the same scenes. Results go beside this file.
+# The weights for photographs: experiment=field, measured on test objects and, where REAL names a folder of them, on
+# real ones with their own colours, in such scenes and before two cameras as they are sold. Results go beside this file.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 here=experiments/field run=outputs/field
@@ -12,13 +12,16 @@ measure() { # where, overrides
         surface_points=20000 examples=3 trainer.threads=1 hydra.run.dir="$run/${where}_best" progress=false "$@"
 }
 
-.venv/bin/python -m stereo_occ.train experiment=field steps=10000 trainer.threads=1 hydra.run.dir="$run" progress=false
+.venv/bin/python -m stereo_occ.train experiment=field trainer.threads=1 hydra.run.dir="$run" progress=false
 measure test
 if [ -n "${REAL:-}" ]; then
     measure real data=meshes data.root="$REAL" data.views=4 texture=own
+    for rig in zed_mini realsense_d435; do
+        measure $rig data=meshes data.root="$REAL" data.views=4 texture=own rig=$rig
+    done
 fi
 .venv/bin/python experiments/collect.py "$run" "$here"
 if [ -n "${REAL:-}" ]; then
-    sed -i "s|$REAL|REAL|" "$here/real.json"
+    sed -i "s|$REAL|REAL|" "$here/real.json" "$here/zed_mini.json" "$here/realsense_d435.json"
 fi
 .venv/bin/python -m stereo_occ.export checkpoint="$run/best.ckpt" output=stereo_occ/weights/field metrics="$here/test.json"

@@ -74,12 +74,15 @@ def main(data: Path) -> None:
         found[model]["iou/solid"] = float(iou_N[~walls_N].mean())
         for category, marker in MARKERS.items():
             of_N = category_N == category
-            axis.scatter(pixels_N[of_N], iou_N[of_N], s=18, marker=marker, color=f"C{color}", alpha=0.7, label=f"{label}, {category}")
+            style = {"s": 18, "marker": marker, "color": f"C{color}", "alpha": 0.7}
+            axis.scatter(pixels_N[of_N], iou_N[of_N], label=f"{label}, {category}", **style)
     line_N = np.geomspace(0.5, 12, 100)
     for off in (0.1, 0.25, 0.5, 1.0):
         axis.plot(line_N, np.clip((line_N - off) / (line_N + off), 0, 1), color="0.6", lw=0.8)
         axis.annotate(f"{off} px", (12, (12 - off) / (12 + off)), fontsize=7, color="0.4", va="center")
-    axis.set(xscale="log", xlabel="thickness of the walls, pixels of the 64", ylabel="iou, mean of 8 poses", ylim=(0, 1))
+    axis.set(
+        xscale="log", xlabel="thickness of the walls, pixels", ylabel="iou, mean of 8 poses", ylim=(0, 1)
+    )
     axis.legend(fontsize=7)
     figure.savefig(HERE / "walls.png", dpi=110)
     found["objects"] = {"walls": int(walls_N.sum()), "solid": int((~walls_N).sum())}

@@ -185,5 +185,6 @@ def test_it_is_taken(case, command, usual):
 def test_a_mistake_does_not_outlive_its_call(command):
     """Several commands of one process, as a notebook runs them: each has its own exit code."""
     (command.folder / "broken.png").write_bytes(b"no picture")
-    assert command("reconstruct", [f"{key}={value}" for key, value in (GIVEN | {"left": "broken.png"}).items()]).code == 2
+    given = GIVEN | {"left": "broken.png"}
+    assert command("reconstruct", [f"{key}={value}" for key, value in given.items()]).code == 2
     reconstructed(command, {})

@@ -26,6 +26,7 @@ def valid():
         ("batch_size=0", "batch_size=0: must be at least 1"),
         ("workers=-1", "workers=-1: must be at least 0"),
         ("optimizer.lr=0", "optimizer.lr=0.0: must be above 0"),
+        ("init=nowhere", "init=nowhere: no such file, nor the name of shipped weights (field, paper_rig)"),
         ("optimizer.name=sgd", "optimizer.name=sgd: unknown; known: adam, adamw"),
         ("optimizer.betas=[0.9]", "optimizer.betas=[0.9]: must be two numbers in [0, 1)"),
         ("scheduler.name=cosin", "scheduler.name=cosin: unknown; did you mean cosine?"),
