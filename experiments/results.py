@@ -18,6 +18,8 @@ from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 HERE = Path(__file__).parent
 README = HERE.parent / "README.md"
 METRICS_PAGE = HERE.parent / "docs" / "metrics.md"
+EXPERIMENTS_PAGE = HERE.parent / "docs" / "experiments.md"
+PROBED = (300, 600, 900, 1200, 2100, 3000)  # steps
 BEGIN, END = "<!-- results:begin -->", "<!-- results:end -->"
 FLOORS = HERE / "floors"
 BASELINES = ("visual_hull", "sgm", "mean_shape", "nearest_shape", "truth")
@@ -26,7 +28,11 @@ RUNS = {
     SHORT / "mono": "model=mono model.encoder.weights=null steps=4000",
     SHORT / "stereo": "model=stereo steps=4000",
     RECIPE / "mono_scratch": "experiment=recipe model=mono_scratch steps=10000",
+    RECIPE / "stereo": "experiment=recipe model=stereo steps=10000",
     RECIPE / "plane_sweep_stereo": "experiment=recipe model=plane_sweep_stereo steps=10000",
+    RECIPE / "plane_sweep_stereo_aided": (
+        "experiment=recipe model=plane_sweep_stereo auxiliary=mask_depth steps=10000"
+    ),
 }
 MONO = RECIPE / "mono_scratch"
 WITH_INTERVALS = (
@@ -112,6 +118,24 @@ def floors() -> str:
     return "\n".join(lines)
 
 
+def probes() -> str:
+    """How one change moves the first steps, as a Markdown table."""
+    with (HERE / "probes" / "probes.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    steps = [str(step) for step in PROBED]
+    lines = [
+        f"| changed | {' | '.join(f'`iou` at {int(step):,}' for step in steps)} | mug / bowl / bottle, last |",
+        "|---" * (2 + len(steps)) + "|",
+    ]
+    for changed in dict.fromkeys(row["changed"] for row in rows):
+        mine = {row["step"]: row for row in rows if row["changed"] == changed}
+        values = (f"{float(mine[step]['iou']):.3f}" if step in mine else "" for step in steps)
+        last = [row for step, row in mine.items() if step in steps][-1]
+        parts = " / ".join(f"{float(last[category]):.2f}" for category in FIGURE_CATEGORIES)
+        lines.append(f"| {f'`{changed}`' if changed else 'nothing'} | {' | '.join(values)} | {parts} |")
+    return "\n".join(lines)
+
+
 def _metrics(path: Path) -> dict[str, float]:
     metrics: dict[str, float] = json.loads(path.read_text())["metrics"]
     return metrics
@@ -152,7 +176,7 @@ def main() -> None:
     (HERE / "results.json").write_text(json.dumps(summary(), indent=1) + "\n")
     curves()
     examples(RECIPE / "plane_sweep_stereo")
-    for page, lines in ((README, table()), (METRICS_PAGE, floors())):
+    for page, lines in ((README, table()), (METRICS_PAGE, floors()), (EXPERIMENTS_PAGE, probes())):
         text = page.read_text()
         before, after = text.split(BEGIN)[0], text.split(END)[1]
         page.write_text(f"{before}{BEGIN}\n{lines}\n{END}{after}")

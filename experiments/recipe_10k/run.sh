@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Mono and the calibrated plane sweep on a quarter of the paper's schedule, with the recipe; measured on test objects
-# and, where REAL names a folder of them, on real ones. Results go beside this file.
+# Mono, the paper's stereo and the calibrated plane sweep, the latter also with auxiliary tasks, on a quarter of the
+# paper's schedule, with the recipe; measured on test objects and, where REAL names a folder of them, on real ones.
+# Results go beside this file.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 here=experiments/recipe_10k
@@ -12,9 +13,11 @@ measure() { # model, where, overrides
         surface_points=20000 examples=3 trainer.threads=1 hydra.run.dir="$run/${where}_best" progress=false "$@"
 }
 
-for name in mono_scratch plane_sweep_stereo; do
-    .venv/bin/python -m stereo_occ.train experiment=recipe scale=laptop steps=10000 model=$name trainer.threads=1 \
-        hydra.run.dir="outputs/recipe_10k/$name" progress=false
+learn() { # name, overrides
+    name=$1; shift
+    .venv/bin/python -m stereo_occ.train experiment=recipe scale=laptop steps=10000 trainer.threads=1 \
+        validation.interval=1000 validation.views=4 validation.points=8192 \
+        hydra.run.dir="outputs/recipe_10k/$name" progress=false "$@"
     measure $name test
     if [ -n "${REAL:-}" ]; then
         measure $name real data=meshes data.root="$REAL" data.views=16
@@ -23,6 +26,17 @@ for name in mono_scratch plane_sweep_stereo; do
     if [ -n "${REAL:-}" ]; then
         sed -i "s|$REAL|REAL|" $here/$name/real.json
     fi
-done
-.venv/bin/python -m stereo_occ.compare outputs/recipe_10k/plane_sweep_stereo/test_best \
-    outputs/recipe_10k/mono_scratch/test_best --output $here/stereo_against_mono
+}
+
+learn mono_scratch model=mono_scratch
+learn stereo model=stereo
+learn plane_sweep_stereo model=plane_sweep_stereo
+learn plane_sweep_stereo_aided model=plane_sweep_stereo auxiliary=mask_depth
+against() { # folder, A, B
+    .venv/bin/python -m stereo_occ.compare "outputs/recipe_10k/$2/test_best" "outputs/recipe_10k/$3/test_best" \
+        --output "$here/$1"
+}
+against stereo_against_mono plane_sweep_stereo mono_scratch
+against paper_stereo_against_mono stereo mono_scratch
+.venv/bin/python -m stereo_occ.export checkpoint=outputs/recipe_10k/plane_sweep_stereo_aided/best.ckpt \
+    output=stereo_occ/weights/paper_rig metrics=$here/plane_sweep_stereo_aided/test.json

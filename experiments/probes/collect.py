@@ -1,0 +1,53 @@
+"""What probes change and how they learn, from their run folders: ``collect.py BASE PROBE...`` writes ``probes.csv``.
+
+A row per validation: the settings in which the probe's ``config.yaml`` differs from the base's, step, IoU, seconds per
+step. The seconds are of a machine that did other things too; they order costs, no more.
+"""
+
+import csv
+import sys
+from pathlib import Path
+from typing import Any
+
+from omegaconf import DictConfig, OmegaConf
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+HERE = Path(__file__).parent
+NOT_PROBED = ("data", "steps", "validation", "logger", "paths", "trainer", "scale.steps", "experiment")
+SCALARS = ("val/iou", "val/iou/mug", "val/iou/bowl", "val/iou/bottle")
+
+
+def flat(node: Any, key: str = "") -> dict[str, Any]:
+    """Leaves of a configuration by their dotted keys."""
+    if not isinstance(node, DictConfig):
+        return {key: OmegaConf.to_container(node) if OmegaConf.is_config(node) else node}
+    return {k: v for name, child in node.items() for k, v in flat(child, f"{key}.{name}".strip(".")).items()}
+
+
+def changes(base: Path, probe: Path) -> str:
+    """The probe's settings that are not the base's."""
+    old, new = (flat(OmegaConf.load(run / "config.yaml")) for run in (base, probe))
+    changed = {k: v for k, v in new.items() if old.get(k) != v and not k.startswith(NOT_PROBED)}
+    return " ".join(f"{key}={value}".replace(" ", "") for key, value in changed.items())
+
+
+def curve(run: Path) -> list[list[str]]:
+    """Step, IoUs and seconds per step of each validation."""
+    events = EventAccumulator(str(run / "tensorboard"), size_guidance={"scalars": 0})
+    events.Reload()
+    loss = events.Scalars("train/loss")
+    seconds = (loss[-1].wall_time - loss[0].wall_time) / (loss[-1].step - loss[0].step)
+    values = zip(*(events.Scalars(name) for name in SCALARS), strict=True)
+    return [[str(v[0].step), *(f"{x.value:.4f}" for x in v), f"{seconds:.3f}"] for v in values]
+
+
+def main(base: Path, *probes: Path) -> None:
+    with (HERE / "probes.csv").open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["changed", "step", "iou", "mug", "bowl", "bottle", "seconds_per_step"])
+        for run in (base, *probes):
+            writer.writerows([changes(base, run), *row] for row in curve(run))
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))
