@@ -56,7 +56,8 @@ def is_first() -> bool:
 
 def started_elsewhere() -> bool:
     """Whether something has started all processes of the group, this one among them."""
-    return "LOCAL_RANK" in os.environ or (SLURMEnvironment.detect() and os.environ["SLURM_NTASKS"] != "1")
+    several = os.environ.get("SLURM_NTASKS", "1") != "1"
+    return "LOCAL_RANK" in os.environ or (several and SLURMEnvironment.detect())
 
 
 def run_in_processes(processes: int, function: Callable[..., object], *arguments: Any) -> None:

@@ -11,9 +11,7 @@ BESIDE_THE_POINT = (
     "You're resuming from a checkpoint that ended before the epoch ended",
     # On a few cores loading in this process is faster.
     r"The '\w+_dataloader' does not have many workers",
-    # Jobs go to Slurm through Hydra's launcher, not through srun.
-    "The `srun` command is available on your system but is not used",
-    # A run is one process, on a machine with Slurm as on any other.
+    # Jobs go to Slurm through Hydra's launcher, not through srun; elsewhere a run does not care that there is Slurm.
     "The `srun` command is available on your system but is not used",
     # Metrics are of all processes' views before they are logged.
     "It is recommended to use `self.log",

@@ -12,7 +12,8 @@ measure() { # where, overrides
         surface_points=20000 examples=3 trainer.threads=1 hydra.run.dir="$run/${where}_best" progress=false "$@"
 }
 
-.venv/bin/python -m stereo_occ.train experiment=field trainer.threads=1 hydra.run.dir="$run" progress=false
+.venv/bin/python -m stereo_occ.train experiment=field trainer.threads=1 \
+    validation.interval=1000 validation.views=2 validation.points=8192 hydra.run.dir="$run" progress=false
 measure test
 if [ -n "${REAL:-}" ]; then
     measure real data=meshes data.root="$REAL" data.views=4 texture=own
