@@ -38,5 +38,7 @@ against() { # folder, A, B
 }
 against stereo_against_mono plane_sweep_stereo mono_scratch
 against paper_stereo_against_mono stereo mono_scratch
+against aided_against_mono plane_sweep_stereo_aided mono_scratch
+against aided_against_unaided plane_sweep_stereo_aided plane_sweep_stereo
 .venv/bin/python -m stereo_occ.export checkpoint=outputs/recipe_10k/plane_sweep_stereo_aided/best.ckpt \
     output=stereo_occ/weights/paper_rig metrics=$here/plane_sweep_stereo_aided/test.json
