@@ -63,7 +63,7 @@ class Rendering:
         """Start the command; ``wait_for_work``: come back when it writes its first file, or has ended."""
         self.before, self.began = shards(self.folder), time.perf_counter()
         self.process = start(self.folder, self.overrides, 2)
-        while wait_for_work and self.process.poll() is None and not self._writes():
+        while wait_for_work and self.process.poll() is None and not any(self.folder.rglob("*.part")):
             time.sleep(0.02)
 
     def kill_within(self, seconds: float, group: bool) -> bool:
@@ -84,9 +84,6 @@ class Rendering:
         self.redone += sum(after[path] != written for path, written in self.before.items())
         partial = len(list(self.folder.rglob("*.part")))
         return {"seconds": round(self.seconds, 1), "shards": len(after), "partial": partial}
-
-    def _writes(self) -> bool:
-        return any(path.name.startswith(".") for path in self.folder.rglob("*.part"))
 
 
 def main() -> None:

@@ -68,7 +68,7 @@ def summary() -> dict[str, Any]:
         run: dict[str, Any] = {"settings": RUNS.get(folder, "experiment=field")}
         for where in ("test", "real"):
             facts = json.loads((folder / f"{where}.json").read_text())
-            run |= {"parameters": facts["parameters"]}
+            run["parameters"] = facts["parameters"]
             run[where] = {"objects": facts["objects"], "metrics": _differences(folder, None, where)}
             if folder.parent == RECIPE and folder != MONO:
                 run[where]["over mono_scratch"] = _differences(folder, MONO, where)

@@ -21,7 +21,7 @@ from stereo_occ.group import started_elsewhere
 from stereo_occ.loggers.config import LoggerConfig, logger_problems
 from stereo_occ.models.build import build_model
 from stereo_occ.optimization import OPTIMIZERS, SCHEDULES
-from stereo_occ.packaged import find_weights, shipped
+from stereo_occ.packaged import is_there, shipped
 from stereo_occ.problems import nearest
 from stereo_occ.shapes.shape import CATEGORIES
 
@@ -69,7 +69,7 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
     ]
     if cfg.checkpoint is None and cfg.baseline is None:
         problems.append("checkpoint: no value given; add checkpoint=... or baseline=...")
-    elif cfg.checkpoint is not None and not (Path(cfg.checkpoint).is_file() or find_weights(cfg.checkpoint)):
+    elif cfg.checkpoint is not None and not is_there(cfg.checkpoint):
         problems.append(
             f"checkpoint={cfg.checkpoint}: no such file; give the path of a .ckpt file of a training run"
         )
@@ -242,7 +242,7 @@ def _settings(cfg: DictConfig) -> Iterator[str]:
     for key in ("optimizer.lr", "trainer.gradient_clip"):
         if _value(cfg, key) is not None and not 0 < _value(cfg, key) < inf:
             yield f"{key}={_value(cfg, key)}: must be above 0 and finite"
-    if cfg.init is not None and not (Path(cfg.init).is_file() or find_weights(cfg.init)):
+    if cfg.init is not None and not is_there(cfg.init):
         yield (
             f"init={cfg.init}: no such file, nor the name of shipped weights ({', '.join(shipped())}); "
             f"give the best.ckpt of a training run"

@@ -54,6 +54,11 @@ def find_weights(name: str) -> Path | None:
     return None if path.is_file() else next((file for file in files if file.is_file()), None)
 
 
+def is_there(name: str) -> bool:
+    """Whether a checkpoint, or weights, can be read by that path or name."""
+    return Path(name).is_file() or find_weights(name) is not None
+
+
 def read_weights(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """The description and the state dict, in single precision, of a ``.safetensors`` file.
 

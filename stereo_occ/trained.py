@@ -1,7 +1,7 @@
 """A trained model with what it needs to know of its training, ready to answer."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,10 @@ from stereo_occ.checkpoint import config_of, plain, read_checkpoint
 from stereo_occ.config import TrainConfig
 from stereo_occ.data.rigs import build_rig
 from stereo_occ.errors import UserError
+from stereo_occ.flat import flat
 from stereo_occ.models.base import OccupancyModel, StereoViews
 from stereo_occ.models.build import build_model
-from stereo_occ.packaged import find_weights, shipped
+from stereo_occ.packaged import is_there, shipped
 from stereo_occ.reconstruction import Occupancy, occupancy_of
 
 #: What a stereo pair (``B = 1``) makes of a model.
@@ -48,7 +49,7 @@ def load_trained(name: str) -> TrainedModel:
     Raises:
         UserError: there is no such file, or it is none of these.
     """
-    if not Path(name).is_file() and find_weights(name) is None:
+    if not is_there(name):
         raise UserError(
             f"checkpoint={name}: no such file, nor the name of shipped weights "
             f"({', '.join(shipped()) or 'there are none'}); give the best.ckpt of a training run"
@@ -89,19 +90,11 @@ def begin_with(name: str, model: OccupancyModel, config: Mapping[str, Any]) -> N
         trained = load_trained(name)
     except UserError as error:
         raise UserError(f"init: {error}") from error
-    theirs, ours = _leaves(trained.config.model), _leaves(config)
+    theirs, ours = flat(trained.config.model, "model."), flat(config, "model.")
     other = sorted(
-        key for key in theirs | ours if theirs.get(key) != ours.get(key) and key != ".encoder.weights"
+        key for key in theirs | ours if theirs.get(key) != ours.get(key) and key != "model.encoder.weights"
     )
     if other:
-        says = ", ".join(f"model{key}={theirs.get(key)}" for key in other)
+        says = ", ".join(f"{key}={theirs.get(key)}" for key in other)
         raise UserError(f"init={name}: is of another model; say {says}, or leave init out")
     model.load_state_dict(trained.model.state_dict())
-
-
-def _leaves(config: Any, key: str = "") -> dict[str, Any]:
-    """The plain values of nested settings by their dotted keys."""
-    values = asdict(config) if is_dataclass(config) and not isinstance(config, type) else config
-    if not isinstance(values, Mapping):
-        return {key: values}
-    return {leaf: v for name, part in values.items() for leaf, v in _leaves(part, f"{key}.{name}").items()}

@@ -7,26 +7,20 @@ step. The seconds are of a machine that did other things too; they order costs, 
 import csv
 import sys
 from pathlib import Path
-from typing import Any
 
-from omegaconf import DictConfig, OmegaConf
+import yaml
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from stereo_occ.flat import flat
 
 HERE = Path(__file__).parent
 NOT_PROBED = ("data", "steps", "validation", "logger", "paths", "trainer", "scale.steps", "experiment")
 SCALARS = ("val/iou", "val/iou/mug", "val/iou/bowl", "val/iou/bottle")
 
 
-def flat(node: Any, key: str = "") -> dict[str, Any]:
-    """Leaves of a configuration by their dotted keys."""
-    if not isinstance(node, DictConfig):
-        return {key: OmegaConf.to_container(node) if OmegaConf.is_config(node) else node}
-    return {k: v for name, child in node.items() for k, v in flat(child, f"{key}.{name}".strip(".")).items()}
-
-
 def changes(base: Path, probe: Path) -> str:
     """The probe's settings that are not the base's."""
-    old, new = (flat(OmegaConf.load(run / "config.yaml")) for run in (base, probe))
+    old, new = (flat(yaml.safe_load((run / "config.yaml").read_text())) for run in (base, probe))
     changed = {k: v for k, v in new.items() if old.get(k) != v and not k.startswith(NOT_PROBED)}
     return " ".join(f"{key}={value}".replace(" ", "") for key, value in changed.items())
 

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 from trimesh import Trimesh
 
+from stereo_occ.flat import flat
+
 Scalar = str | int | float | bool
 
 
@@ -58,12 +60,9 @@ class Board(Logger):
         """Predicted probabilities beside the truth, for a curve that can be explored."""
 
 
-def flatten(config: Mapping[str, Any], prefix: str = "") -> dict[str, Scalar]:
+def flatten(config: Mapping[str, Any]) -> dict[str, Scalar]:
     """Nested dictionaries to dotted keys with scalar values."""
-    flat: dict[str, Scalar] = {}
-    for key, value in config.items():
-        if isinstance(value, Mapping):
-            flat |= flatten(value, f"{prefix}{key}.")
-        else:
-            flat[f"{prefix}{key}"] = value if isinstance(value, (int, float, bool)) else str(value)
-    return flat
+    return {
+        key: value if isinstance(value, (int, float, bool)) else str(value)
+        for key, value in flat(config).items()
+    }

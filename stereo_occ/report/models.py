@@ -13,6 +13,7 @@ from stereo_occ.compare import SAME, check_alike
 from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
 from stereo_occ.evaluation_rows import Evaluations, read_evaluations, read_facts
+from stereo_occ.flat import flat
 from stereo_occ.shapes.shape import CATEGORIES
 
 #: Settings of a training that do not make another model, by the start of their dotted name.
@@ -115,17 +116,17 @@ def model_settings(facts: Mapping[str, Any]) -> Settings:
     """What makes an evaluated model, by dotted key; seeds of one model have the same."""
     predictor, trained = facts.get("predictor") or {}, facts.get("trained")
     if "baseline" in predictor:
-        return _flat(predictor["baseline"], "baseline.")
-    control = _flat(facts.get("control") or {"name": "none", "degrees": 0.0}, "control.")
+        return flat(predictor["baseline"], "baseline.")
+    control = flat(facts.get("control") or {"name": "none", "degrees": 0.0}, "control.")
     if trained is None:
         return {"parameters": facts.get("parameters"), "step": facts.get("step")} | control
     config = trained["config"]
     with suppress(UserError):
         config = plain(training_config(config))  # with the values that newer keys have by default
-    flat = {key: value for key, value in _flat(config).items() if not key.startswith(SAME_MODEL)}
-    under = {key: flat.pop(key) for key in list(flat) if key.startswith("control.")}
+    settings = {key: value for key, value in flat(config).items() if not key.startswith(SAME_MODEL)}
+    under = {key: settings.pop(key) for key in list(settings) if key.startswith("control.")}
     trained_under = {} if under == control else {f"trained_under_{key}": under[key] for key in under}
-    return flat | control | trained_under
+    return settings | control | trained_under
 
 
 def labels_of(models: Sequence[Settings]) -> list[str]:
@@ -169,16 +170,6 @@ def _uses_pair(settings: Settings) -> bool:
         and settings.get("control.name", "none") == "none"
         and "trained_under_control.name" not in settings
     )
-
-
-def _flat(values: Mapping[str, Any], prefix: str = "") -> Settings:
-    flat: Settings = {}
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            flat |= _flat(value, f"{prefix}{key}.")
-        else:
-            flat[f"{prefix}{key}"] = value
-    return flat
 
 
 def _check_same(first: Model, model: Model, index: int, folder: Path) -> None:
