@@ -12,6 +12,7 @@ import csv
 import json
 import sys
 from collections import defaultdict
+from dataclasses import dataclass
 from math import radians, tan
 from pathlib import Path
 
@@ -50,32 +51,62 @@ def offset(pixels_N: np.ndarray, iou_N: np.ndarray) -> float:
     return float(np.median(pixels_N * (1 - iou_N) / (1 + iou_N)))
 
 
-def main(data: Path) -> None:
+@dataclass(frozen=True)
+class Objects:
+    """The test objects: category, name, thickness in pixels, and each model's IoU."""
+
+    category_N: np.ndarray
+    names: list[str]
+    pixels_N: np.ndarray
+    iou_N: dict[str, np.ndarray]
+
+
+def read(data: Path) -> Objects:
+    """The objects that the models were measured on."""
     ious = {model: iou_per_object(model) for model in MODELS}
-    objects = sorted(ious["plane_sweep_stereo"])
-    pixels_N = np.array([thickness(data / category / f"{name}.h5") for category, name in objects])
+    keys = sorted(ious["plane_sweep_stereo"])
+    return Objects(
+        np.array([category for category, _ in keys]),
+        [name for _, name in keys],
+        np.array([thickness(data / category / f"{name}.h5") for category, name in keys]),
+        {model: np.array([values[key] for key in keys]) for model, values in ious.items()},
+    )
+
+
+def write_table(objects: Objects) -> None:
+    """A row per object."""
     with (HERE / "walls.csv").open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["category", "object_id", "wall_px", *(f"iou_{model}" for model in MODELS)])
-        for (category, name), pixels in zip(objects, pixels_N, strict=True):
-            values = (f"{ious[model][category, name]:.4f}" for model in MODELS)
-            writer.writerow([category, name, f"{pixels:.3f}", *values])
-    walls_N = pixels_N < SOLID
-    category_N = np.array([category for category, _ in objects])
-    figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
+        columns = objects.category_N, objects.names, objects.pixels_N, *objects.iou_N.values()
+        for category, name, pixels, *ious in zip(*columns, strict=True):
+            writer.writerow([category, name, f"{pixels:.3f}", *(f"{iou:.4f}" for iou in ious)])
+
+
+def summary(objects: Objects) -> dict[str, dict[str, float]]:
+    """How far off each model's walls are, and its IoU of walls and of solids."""
+    walls_N = objects.pixels_N < SOLID
     found: dict[str, dict[str, float]] = {}
-    for color, (model, label) in enumerate(MODELS.items()):
-        iou_N = np.array([ious[model][key] for key in objects])
-        found[model] = {"wall_off_px": offset(pixels_N[walls_N], iou_N[walls_N])}
+    for model, iou_N in objects.iou_N.items():
+        found[model] = {"wall_off_px": offset(objects.pixels_N[walls_N], iou_N[walls_N])}
         for category in MARKERS:
-            chosen_N = walls_N & (category_N == category)
-            found[model][f"wall_off_px/{category}"] = offset(pixels_N[chosen_N], iou_N[chosen_N])
+            chosen_N = walls_N & (objects.category_N == category)
+            found[model][f"wall_off_px/{category}"] = offset(objects.pixels_N[chosen_N], iou_N[chosen_N])
             found[model][f"iou/{category}"] = float(iou_N[chosen_N].mean())
         found[model]["iou/solid"] = float(iou_N[~walls_N].mean())
+    found["objects"] = {"walls": int(walls_N.sum()), "solid": int((~walls_N).sum())}
+    return found
+
+
+def draw(objects: Objects) -> None:
+    """IoU against thickness, and what walls that are off would have."""
+    figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
+    for color, (model, label) in enumerate(MODELS.items()):
         for category, marker in MARKERS.items():
-            of_N = category_N == category
+            of_N = objects.category_N == category
             style = {"s": 18, "marker": marker, "color": f"C{color}", "alpha": 0.7}
-            axis.scatter(pixels_N[of_N], iou_N[of_N], label=f"{label}, {category}", **style)
+            points = objects.pixels_N[of_N], objects.iou_N[model][of_N]
+            axis.scatter(*points, label=f"{label}, {category}", **style)
     line_N = np.geomspace(0.5, 12, 100)
     for off in (0.1, 0.25, 0.5, 1.0):
         axis.plot(line_N, np.clip((line_N - off) / (line_N + off), 0, 1), color="0.6", lw=0.8)
@@ -85,8 +116,13 @@ def main(data: Path) -> None:
     )
     axis.legend(fontsize=7)
     figure.savefig(HERE / "walls.png", dpi=110)
-    found["objects"] = {"walls": int(walls_N.sum()), "solid": int((~walls_N).sum())}
-    (HERE / "walls.json").write_text(json.dumps(found, indent=2) + "\n")
+
+
+def main(data: Path) -> None:
+    objects = read(data)
+    write_table(objects)
+    draw(objects)
+    (HERE / "walls.json").write_text(json.dumps(summary(objects), indent=2) + "\n")
 
 
 if __name__ == "__main__":
