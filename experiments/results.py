@@ -163,6 +163,25 @@ def curves() -> None:
     figure.savefig(SHORT / "curves.png", dpi=110)
 
 
+def recipe_curves() -> None:
+    """Each metric along the training of each model of the recipe, on validation objects, beside two floors."""
+    figure, axes = plt.subplots(1, len(METRICS), figsize=(11, 3.4), layout="constrained")
+    for axis, metric in zip(axes, METRICS, strict=True):
+        for folder in (folder for folder in RUNS if folder.parent == RECIPE):
+            history = json.loads((folder / "training.json").read_text())["history"]
+            steps = [entry["step"] for entry in history]
+            axis.plot(steps, [entry[f"val/{metric}"] for entry in history], label=folder.name)
+        for name, style in (("truth", "--"), ("mean_shape", ":")):
+            level = _metrics(FLOORS / name / "test.json")[f"test/{metric}"]
+            if level < 0.99:  # else at the top of the scale
+                axis.axhline(level, color="grey", linestyle=style, label=f"{name} (test objects)")
+        axis.set(title=metric, xlabel="step", ylim=(0, None))
+        axis.grid(alpha=0.3)
+    axes[0].set_ylabel("macro IoU, validation objects")
+    axes[-1].legend(fontsize=7, loc="lower right")
+    figure.savefig(RECIPE / "curves.png", dpi=110)
+
+
 def examples(folder: Path) -> None:
     """The first test object of each category: left | right | predicted | true."""
     rows = []
@@ -175,6 +194,7 @@ def examples(folder: Path) -> None:
 def main() -> None:
     (HERE / "results.json").write_text(json.dumps(summary(), indent=1) + "\n")
     curves()
+    recipe_curves()
     examples(RECIPE / "plane_sweep_stereo")
     for page, lines in ((README, table()), (METRICS_PAGE, floors()), (EXPERIMENTS_PAGE, probes())):
         text = page.read_text()
