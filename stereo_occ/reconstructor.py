@@ -176,7 +176,8 @@ class Reconstructor:
             left, right: image files, or RGB ``(H, W, 3)``.
             rig: calibration, or its files; see :func:`~stereo_occ.calibration.read_calibration`, also for ``unit``
                 and ``rectified``.
-            boxes: around the object in each image: left, top, right, bottom, pixels.
+            boxes: around the object in each image: left, top, right, bottom, pixels. What is given for one image alone
+                is looked for in the other.
             masks: image files or boolean ``(H, W)``, where the object is. Without boxes and masks: the images'
                 transparency, else ``center`` and ``size``, else what stands out from a plain background.
             center: of the object, left camera's frame, metres; triangulated if None.
@@ -193,7 +194,7 @@ class Reconstructor:
         on_object = isinstance(self.config.rig, RectifiedRigConfig)
         given = center is not None and size is not None
         with _timed(seconds, "locate"):
-            found = locate_pair(photos, boxes, masks, required=on_object and not given)
+            found = locate_pair(pair, photos, boxes, masks, required=on_object and not given)
         with _timed(seconds, "frame"):
             framing = self._frame(pair, found, center, size)
             views = self._views(pair, photos, found, framing)

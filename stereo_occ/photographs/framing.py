@@ -12,7 +12,7 @@ from math import acos, asin, degrees
 import numpy as np
 from numpy.typing import NDArray
 
-from stereo_occ.calibration import RealCamera, RealPair
+from stereo_occ.calibration import RealPair
 from stereo_occ.data.placement import Placement
 from stereo_occ.data.rigs import (
     RandomisedRigConfig,
@@ -26,6 +26,7 @@ from stereo_occ.geometry.camera import Camera, StereoRig
 from stereo_occ.geometry.crop import Box
 from stereo_occ.geometry.cube import cube_at, ray, triangulate, working_cube
 from stereo_occ.photographs.locate import Found
+from stereo_occ.photographs.photo import pixels_in
 
 #: How far a pair may be from the fixed one of a checkpoint, degrees and share of the distance.
 ANGLE, DISTANCE = 2.0, 0.05
@@ -89,7 +90,7 @@ def frame_on_object(
         boxes = tuple(_ball_box(camera, center_3, size) for camera in rig.cameras)
     else:
         boxes = tuple(
-            Box.around(_pixels_in(target, camera, part.outline_N2))
+            Box.around(pixels_in(target, camera, part.outline_N2))
             for target, camera, part in zip(rig.cameras, pair.cameras, found, strict=True)
         )
     left, right = boxes
@@ -154,12 +155,6 @@ def _angles(config: RigConfig) -> tuple[float, float]:
         return degrees(low), degrees(high)
     assert isinstance(config, ToedInRigConfig)
     return 2 * config.half_angle_deg, 2 * config.half_angle_deg
-
-
-def _pixels_in(target: Camera, camera: RealCamera, pixels_N2: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Pixels of a photograph in the image of a target at the same place."""
-    rays_N3 = camera.rays(pixels_N2) @ camera.rotation_33 @ target.camera_from_rig[:3, :3].T @ target.K.T
-    return np.asarray(rays_N3[:, :2] / rays_N3[:, 2:])
 
 
 def _ball_box(camera: Camera, center_3: NDArray[np.float64], size: float) -> Box:

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereo_occ.calibration import RealPair
 from stereo_occ.errors import UserError
 from stereo_occ.photographs.locate import Found, in_box, in_mask, on_plain_background
+from stereo_occ.photographs.match import SIDES, matched
 from stereo_occ.photographs.photo import Photo, read_mask, read_photo
-
-SIDES = ("left", "right")
 
 Pair = tuple[Any, Any]
 ImageFile = str | Path | NDArray[np.uint8]
@@ -30,21 +30,23 @@ def photo_of(image: ImageFile, name: str) -> Photo:
 
 
 def locate_pair(
-    photos: tuple[Photo, Photo], boxes: Pair, masks: Pair, required: bool
+    pair: RealPair, photos: tuple[Photo, Photo], boxes: Pair, masks: Pair, required: bool
 ) -> tuple[Found, Found] | None:
     """Where the object is in both images, or None where that is neither given nor ``required``.
 
+    What is given for one image alone is looked for in the other.
+
+    Args:
+        pair: fitted to the photographs.
+
     Raises:
-        UserError: it is given for one image alone or wrongly, or not found though it is required.
+        UserError: it is given wrongly, or not found though it is required.
     """
-    found = [_given(*part) for part in zip(photos, boxes, masks, SIDES, strict=True)]
-    if found[0] is not None and found[1] is not None:
-        return found[0], found[1]
-    if found[0] is not None or found[1] is not None:
-        have, lack = SIDES if found[0] is not None else SIDES[::-1]
-        raise UserError(
-            f"{lack}: where the object is was given for the {have} image alone; give {lack}_box= too"
-        )
+    in_left, in_right = (_given(*part) for part in zip(photos, boxes, masks, SIDES, strict=True))
+    if in_left is not None:
+        return in_left, in_right or matched(pair, photos, in_left, 0)
+    if in_right is not None:
+        return matched(pair, photos, in_right, 1), in_right
     if not required:
         return None
     left, right = (

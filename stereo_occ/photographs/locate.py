@@ -57,10 +57,17 @@ def in_box(values: Sequence[float], size: tuple[int, int], name: str) -> Found:
             f"{name}={list(values)}: reaches out of the image of {width} x {height} pixels; "
             f"give left, top, right, bottom in its pixels"
         )
+    return Found(outline_of(Box(left, top, right, bottom)), None, "box")
+
+
+def outline_of(box: Box) -> NDArray[np.float64]:
+    """Pixels ``(N, 2)`` along the edges of a box: a lens or another camera may bend them."""
     along = np.linspace(0, 1, 9)[:, None]
-    corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+    corners = np.array(
+        [[box.left, box.top], [box.right, box.top], [box.right, box.bottom], [box.left, box.bottom]]
+    )
     edges = [a + along * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
-    return Found(np.concatenate(edges), None, "box")
+    return np.concatenate(edges)
 
 
 def in_mask(mask_HW: NDArray[np.bool_], how: str = "mask") -> Found:

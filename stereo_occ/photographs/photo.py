@@ -98,8 +98,7 @@ def seen_by(
         target: its rig frame is the left camera's.
         outside: value beyond the edges of the image; None: the edge's own.
     """
-    ray_corners_43 = _rays(target, _corners(target)) @ _turn(camera, target).T
-    reach = camera.pixels_along(ray_corners_43)
+    reach = pixels_from(target, camera, _corners(target))
     extent = np.ptp(reach, axis=0) / [target.width, target.height]
     scale = float(extent.max())
     factor = max(1, int(scale // SAMPLES))
@@ -108,7 +107,7 @@ def seen_by(
     u = (np.arange(target.width)[:, None] + offsets).ravel()
     v = (np.arange(target.height)[:, None] + offsets).ravel()
     grid_N2 = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
-    source_N2 = camera.pixels_along(_rays(target, grid_N2) @ _turn(camera, target).T)
+    source_N2 = pixels_from(target, camera, grid_N2)
     source_N2 = (source_N2 + 0.5) / factor - 0.5
     mode, fill = ("nearest", 0.0) if outside is None else ("grid-constant", outside)
     channels = []
@@ -120,6 +119,17 @@ def seen_by(
         samples = samples_N.reshape(target.height, per_axis, target.width, per_axis)
         channels.append(samples.mean(axis=(1, 3)))
     return np.stack(channels, axis=-1)
+
+
+def pixels_in(target: Camera, camera: RealCamera, pixels_N2: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Pixels ``(N, 2)`` of a photograph in the image of a target at the same place."""
+    rays_N3 = camera.rays(pixels_N2) @ _turn(camera, target) @ target.K.T
+    return np.asarray(rays_N3[:, :2] / rays_N3[:, 2:])
+
+
+def pixels_from(target: Camera, camera: RealCamera, pixels_N2: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Pixels ``(N, 2)`` of the target's image in the photograph: the way back from :func:`pixels_in`."""
+    return camera.pixels_along(_rays(target, pixels_N2) @ _turn(camera, target).T)
 
 
 def _turn(camera: RealCamera, target: Camera) -> NDArray[np.float64]:

@@ -121,6 +121,18 @@ def test_the_mesh_is_where_the_object_is_in_the_left_cameras_frame(name):
     assert 0.2 < result.unit < 0.25  # 1.5 times the diagonal of the ball's box, 0.14 m
 
 
+@pytest.mark.parametrize("index", [0, 1])
+@pytest.mark.parametrize("name", PAIRS)
+def test_a_box_in_one_image_is_found_in_the_other(name, index):
+    pair = PAIRS[name]
+    images = [photograph(camera) for camera in pair.cameras]
+    truth = [list(vars(box_of(image)).values()) for image in images]
+    boxes = (truth[0], None) if index == 0 else (None, truth[1])
+    result = on_object()(*images, pair, boxes=boxes, surface=COARSE)
+    assert result.found[1 - index].how == f"like the {'right' if index else 'left'} one"
+    np.testing.assert_allclose(list(vars(result.found[1 - index].box).values()), truth[1 - index], atol=2)
+
+
 def test_the_size_of_the_images_does_not_matter():
     pair = PAIRS["parallel"]
     images = [photograph(camera) for camera in pair.cameras]
@@ -227,7 +239,10 @@ def test_another_arrangement_than_the_papers_is_refused(pair, complaint):
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        ({"boxes": ([10, 10, 20, 20], None)}, "given for the left image alone; give right_box="),
+        (
+            {"boxes": ([10, 10, 20, 20], None)},
+            "right: nothing in it looks like .* left image; .* give right_box=",
+        ),
         ({"boxes": ([10, 10, 5, 20],) * 2}, "left_box=.*must have left < right"),
         ({"boxes": ([10, 10, 700, 20],) * 2}, "left_box=.*reaches out of the image of 640 x 360 pixels"),
         ({"boxes": ([10, 10, 20],) * 2}, "must be \\[left,top,right,bottom\\]"),
