@@ -24,8 +24,9 @@ from stereo_occ.models.base import StereoViews
 from stereo_occ.packaged import DEFAULT
 from stereo_occ.photographs.color import vertex_colors
 from stereo_occ.photographs.framing import Framing, frame_on_fixation, frame_on_object
-from stereo_occ.photographs.given import SIDES, ImageFile, Pair, locate_pair, photo_of
+from stereo_occ.photographs.given import ImageFile, Pair, locate_pair, photo_of
 from stereo_occ.photographs.locate import Found
+from stereo_occ.photographs.match import SIDES
 from stereo_occ.photographs.outline import preview
 from stereo_occ.photographs.photo import Photo, seen_by
 from stereo_occ.reconstruction import expected_iou, sample_cube

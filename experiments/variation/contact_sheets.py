@@ -35,6 +35,7 @@ SHEETS: dict[str, tuple[list[str], bool]] = {
     "texture": (["texture=procedural", "texture.share=1"], False),
     "placement": (["placement=table"], False),
     "clutter": (DESK, False),
+    "photographs": (["background=photographs", *DESK[1:]], False),
     "occlusion": ([*DESK, "background.clutter.occlusion=0.4", "background.clutter.things=[10,12]"], False),
     "masked": (["background=clutter", "background.masked=true", "sensor=noisy", "placement=table"], False),
     "sensor": (["sensor=noisy"], False),

@@ -15,6 +15,7 @@ from stereo_occ.geometry.camera import StereoRig
 from stereo_occ.geometry.pose import Pose
 from stereo_occ.ranges import bounds, draw, draw_log, share
 from stereo_occ.render.finish import Finish, Pattern
+from stereo_occ.render.pictured import PHOTOGRAPHS, photograph, pictured_plane
 from stereo_occ.render.primitives import Solid, ball, box, cylinder, plane
 
 #: Things on the table; the shader's 16, less the object, the table and the wall.
@@ -25,6 +26,9 @@ SHADES = 5
 
 #: Sides of the table and the wall, diagonals of the object.
 EXTENT = 150.0
+
+#: Side of a photograph on the table or the wall, diagonals of the object, log-uniform.
+PICTURED = (8.0, 20.0)
 
 #: Places tried for each thing.
 CANDIDATES = 12
@@ -49,6 +53,7 @@ class ClutterConfig:
     period: list[float] = MISSING  # of a pattern, log-uniform
     roughness: list[float] = MISSING  # 0 to 1
     occlusion: float = MISSING  # share of the object's width that a nearer thing may hide
+    photographs: float = 0.0  # share of tables and walls that show a photograph, one of scikit-image's
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,19 +98,25 @@ def draw_clutter(
     if up_3 is None:
         up_3 = np.array([0.0, np.cos(elevation), np.sin(elevation)])
     level = _Level(pose.to_rig(hull_N3), pose.scale, rig, up_3)
-    wall = _wall(config, pose.scale, rng)
+    surfaces = [_surface(config, spare) for spare in rng.spawn(2)]
+    (table, _), (wall, _) = surfaces
+    wall = _wall(config, wall, pose.scale, rng)
     placed = _on_table(config, level, count, rng)
-    solids = [_placed(plane(), np.eye(3), np.full(3, EXTENT * pose.scale), np.zeros(3)), wall, *placed]
+    solids = [_placed(table, np.eye(3), np.full(3, EXTENT * pose.scale), np.zeros(3)), wall, *placed]
     finishes = [_finish(config, pose.scale, rng) for _ in solids]
     finishes[0] = replace(finishes[0], extra_4=SHADED)
+    colors = [np.zeros((len(positions_V3), 4)) for positions_V3, _, _ in solids]
+    for number, (_, colors_V4) in enumerate(surfaces):
+        if colors_V4 is not None:
+            colors[number] = colors_V4
+            finishes[number] = replace(finishes[number], pattern=Pattern.own)
     parts, offset = [], 0
-    for number, ((positions_V3, normals_V3, faces_F3), finish) in enumerate(
-        zip(solids, finishes, strict=True), start=1
+    for number, ((positions_V3, normals_V3, faces_F3), finish, colors_V4) in enumerate(
+        zip(solids, finishes, colors, strict=True), start=1
     ):
         matrix = finish.texture_from_object
         texture_V3 = positions_V3 @ matrix[:3, :3].T + matrix[:3, 3]
         numbers_V1 = np.full((len(positions_V3), 1), number)
-        colors_V4 = np.zeros((len(positions_V3), 4))
         to_rig = level.rig_from_level_33.T
         parts.append(
             (
@@ -229,11 +240,20 @@ def _visible(
     return visible_C
 
 
-def _wall(config: ClutterConfig, diagonal: float, rng: np.random.Generator) -> Solid:
+def _surface(config: ClutterConfig, rng: np.random.Generator) -> tuple[Solid, NDArray[np.float64] | None]:
+    """A plane, with the colours of its vertices if it shows a photograph."""
+    if rng.random() >= share(config.photographs, "background.clutter.photographs"):
+        return plane(), None
+    name = PHOTOGRAPHS[int(rng.integers(len(PHOTOGRAPHS)))]
+    side = float(np.exp(rng.uniform(*np.log(PICTURED))))
+    return pictured_plane(photograph(name), side / EXTENT)
+
+
+def _wall(config: ClutterConfig, surface: Solid, diagonal: float, rng: np.random.Generator) -> Solid:
     distance = diagonal * draw_log(config.wall, "background.clutter.wall", rng, 0.5, EXTENT / 4)
     upright_33 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # +Y to +Z
     turn_33 = _about_y(np.radians(rng.uniform(-40, 40))) @ upright_33
-    return _placed(plane(), turn_33, np.full(3, EXTENT * diagonal), np.array([0, 0, -distance]))
+    return _placed(surface, turn_33, np.full(3, EXTENT * diagonal), np.array([0, 0, -distance]))
 
 
 def _about_y(angle: float) -> NDArray[np.float64]:

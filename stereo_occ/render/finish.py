@@ -57,3 +57,10 @@ class Finish:
             self.extra_4,
         ]
         return np.array(rows, np.float32)
+
+
+def root_of_linear(srgb_V3: NDArray[np.number]) -> NDArray[np.float64]:
+    """Own colours of a mesh as its vertices carry them: square roots of linear reflectances, from sRGB 0 to 255."""
+    srgb_V3 = srgb_V3 / 255
+    linear_V3 = np.where(srgb_V3 <= 0.04045, srgb_V3 / 12.92, ((srgb_V3 + 0.055) / 1.055) ** 2.4)
+    return np.sqrt(linear_V3)

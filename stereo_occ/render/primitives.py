@@ -59,6 +59,17 @@ def plane() -> Solid:
     return positions, np.tile([0.0, 1.0, 0.0], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]])
 
 
+def grid(lines_N: NDArray[np.float64]) -> Solid:
+    """A square at y = 0 that faces +Y, cut along the same ascending lines ``(N,)`` in x and in z; row by row."""
+    z_V, x_V = (lines.ravel() for lines in np.meshgrid(lines_N, lines_N, indexing="ij"))
+    positions = np.stack([x_V, np.zeros_like(x_V), z_V], axis=1)
+    count = len(lines_N)
+    first = (np.arange(count - 1) + count * np.arange(count - 1)[:, None]).ravel()
+    a, b, c, d = first, first + count, first + count + 1, first + 1
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return positions, np.tile(UP, (len(positions), 1)), faces
+
+
 def _turned(profile: list[tuple[float, float]], normals: list[tuple[float, float]]) -> Solid:
     """A profile (radius, height), bottom up, turned about +Y; its normals point away from the solid."""
     turn_S = np.linspace(0, 2 * np.pi, SECTIONS + 1)

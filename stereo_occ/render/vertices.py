@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereo_occ.render.clutter import Clutter
+from stereo_occ.render.finish import root_of_linear
 
 #: Components of position, normal, colour (w: inside) and place in the texture (w: number of the thing).
 ATTRIBUTES = (3, 3, 4, 4)
@@ -26,15 +27,14 @@ def object_vertices(
 ) -> NDArray[np.float32]:
     """Vertices ``(V, 14)`` of an object that stands on its -Y, with or without colours of its own (sRGB)."""
     count = len(positions_V3)
-    srgb_V3 = np.zeros((count, 3)) if colors_V3 is None else colors_V3 / 255
-    linear_V3 = np.where(srgb_V3 <= 0.04045, srgb_V3 / 12.92, ((srgb_V3 + 0.055) / 1.055) ** 2.4)
+    own_V3 = np.zeros((count, 3)) if colors_V3 is None else root_of_linear(colors_V3)
     foot_M3 = positions_V3[
         positions_V3[:, 1] < positions_V3[:, 1].min() + 0.05
     ]  # a handle does not reach down
     axis_3 = (foot_M3.min(axis=0) + foot_M3.max(axis=0)) / 2
     outwards_V = ((positions_V3 - axis_3) * normals_V3)[:, [0, 2]].sum(axis=1)
     inside_V1 = (outwards_V < -0.02)[:, None]
-    parts = [positions_V3, normals_V3, np.sqrt(linear_V3), inside_V1, positions_V3, np.zeros((count, 1))]
+    parts = [positions_V3, normals_V3, own_V3, inside_V1, positions_V3, np.zeros((count, 1))]
     return np.concatenate(parts, axis=1).astype(np.float32)
 
 

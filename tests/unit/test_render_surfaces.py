@@ -16,7 +16,9 @@ from stereo_occ.geometry.rotations import random_rotations
 from stereo_occ.pictures import LOOK
 from stereo_occ.render.appearance import GAMMA
 from stereo_occ.render.clutter import draw_clutter
-from stereo_occ.render.finish import Finish, Pattern
+from stereo_occ.render.finish import Finish, Pattern, root_of_linear
+from stereo_occ.render.pictured import PHOTOGRAPHS, photograph, pictured_plane
+from stereo_occ.render.pictured import SIDE as SIDE_OF_PHOTOGRAPHS
 from stereo_occ.render.stereo import StereoRenderer
 from stereo_occ.render.texture import PATTERNS, TextureConfig, draw_finish, periodic, plain_finish
 from stereo_occ.shapes.procedural import procedural_shape
@@ -126,6 +128,47 @@ def test_occlusion_hides_a_part_where_it_is_asked_for(renderer, mug):
         alone = renderer.render(RIG, pose.rig_from_object, LOOK)
         shares.append(images.mask_2HW.sum() / alone.mask_2HW.sum())
     assert 0.3 < min(shares) < 0.98
+
+
+def test_photographs_on_table_and_wall_change_colours_alone(renderer, mug):
+    pose = poses(1)[0]
+    plain, pictured = (clutter_of(mug, pose, f"background.clutter.photographs={share}") for share in (0, 1))
+    renderer.load(mug)
+    before, after = (
+        renderer.render(RIG, pose.rig_from_object, replace(LOOK, clutter=clutter))
+        for clutter in (plain, pictured)
+    )
+    np.testing.assert_array_equal(before.mask_2HW, after.mask_2HW)
+    np.testing.assert_array_equal(before.depth_2HW, after.depth_2HW)
+    moved_N = pictured.vertices_V14[pictured.vertices_V14[:, 13] > 2, :3]
+    np.testing.assert_array_equal(moved_N, plain.vertices_V14[plain.vertices_V14[:, 13] > 2, :3])
+    around = before.mask_2HW == 0
+    assert (before.rgb_2HW3[around] != after.rgb_2HW3[around]).any(axis=1).mean() > 0.5
+
+
+def test_a_pictured_plane_shows_the_photograph_upright():
+    rgb_HW3 = np.random.default_rng(0).integers(256, size=(7, 7, 3), dtype=np.uint8)
+    (positions_V3, normals_V3, faces_F3), colors_V4 = pictured_plane(rgb_HW3, 0.5)
+    corners_F33 = positions_V3[faces_F3]
+    sides_F3 = np.cross(corners_F33[:, 1] - corners_F33[:, 0], corners_F33[:, 2] - corners_F33[:, 0])
+    assert (sides_F3[:, 1] > 0).all()
+    assert sides_F3[:, 1].sum() / 2 == pytest.approx(1)
+    np.testing.assert_array_equal(normals_V3, np.tile([0, 1, 0], (len(positions_V3), 1)))
+    for place, pixel in (((-0.25, -0.25), (0, 0)), ((0.25, -0.25), (0, 6)), ((-0.25, 0.25), (6, 0))):
+        (vertex,) = np.flatnonzero(np.isclose(positions_V3[:, [0, 2]], place).all(axis=1))
+        np.testing.assert_allclose(colors_V4[vertex, :3], root_of_linear(rgb_HW3[pixel]))
+    assert len(np.unique(colors_V4[np.abs(positions_V3).max(axis=1) > 0.26], axis=0)) == 1
+
+
+def test_own_colours_are_roots_of_linear_ones():
+    np.testing.assert_allclose(root_of_linear(np.array([0, 188, 255])) ** 2, [0, 0.503, 1], atol=1e-3)
+
+
+@pytest.mark.parametrize("name", PHOTOGRAPHS)
+def test_every_photograph_is_there(name):
+    picture = photograph(name)
+    assert picture.shape == (SIDE_OF_PHOTOGRAPHS, SIDE_OF_PHOTOGRAPHS, 3)
+    assert picture.std() > 10
 
 
 def test_the_table_has_the_right_parallax(renderer, mug):
