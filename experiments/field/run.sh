@@ -20,9 +20,10 @@ if [ -n "${REAL:-}" ]; then
     for rig in zed_mini realsense_d435; do
         measure $rig data=meshes data.root="$REAL" data.views=4 texture=own rig=$rig
     done
+    measure photographs data=meshes data.root="$REAL" data.views=4 texture=own rig=zed_mini background=photographs
 fi
 .venv/bin/python experiments/collect.py "$run" "$here"
 if [ -n "${REAL:-}" ]; then
-    sed -i "s|$REAL|REAL|" "$here/real.json" "$here/zed_mini.json" "$here/realsense_d435.json"
+    sed -i "s|$REAL|REAL|" "$here"/{real,zed_mini,realsense_d435,photographs}.json
 fi
 .venv/bin/python -m stereo_occ.export checkpoint="$run/best.ckpt" output=stereo_occ/weights/field metrics="$here/test.json"

@@ -14,6 +14,6 @@ def mesh_iou(predicted: Trimesh, true: Trimesh) -> float | None:
 
 
 def _solid(mesh: Trimesh) -> Manifold | None:
-    faces_F3 = np.ascontiguousarray(mesh.faces, np.uint64)
-    solid = Manifold(Mesh64(np.ascontiguousarray(mesh.vertices, np.float64), faces_F3))
+    # Copies: it takes no arrays that are read-only.
+    solid = Manifold(Mesh64(np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.uint64)))
     return solid if solid.status() == Error.NoError and solid.volume() > 0 else None

@@ -74,6 +74,13 @@ def test_iou_is_the_same_both_ways_and_of_bodies_apart():
     assert mesh_iou(box(0.2, 0.2, 0.2), two) == pytest.approx(0.5, abs=1e-9)
 
 
+def test_meshes_that_may_not_be_written_to_are_measured_too():
+    cube = box(0.2, 0.2, 0.2)
+    vertices, faces = np.array(cube.vertices), np.array(cube.faces)
+    vertices.flags.writeable = faces.flags.writeable = False
+    assert mesh_iou(Trimesh(vertices, faces, process=False), cube) == pytest.approx(1, abs=1e-9)
+
+
 def test_normals_at_right_angles_and_turned_round():
     """Only the direction of a normal counts, not its sense; a plane against one at a right angle gives 0."""
     rng = np.random.default_rng(0)
