@@ -3,6 +3,7 @@
     python -m benchmarks.training_step --threads 2
 
 The floor is the step's operations, forward and back, at the rate of one large bf16 matrix product on as many threads.
+Reading is one batch from shards, in the training's own process.
 Every way runs in a process of its own; the processes take turns, one step each, so that whatever else the machine does
 hits them alike. Ours reads shards and trains as ``stereo_occ.train`` does; the reference is ``reference_step``.
 """
@@ -18,11 +19,13 @@ from dataclasses import dataclass
 from itertools import cycle
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from omegaconf import DictConfig, OmegaConf
 from torch.nn.functional import binary_cross_entropy_with_logits
+from torch.profiler import ProfilerActivity, profile
 from torch.utils.flop_counter import FlopCounterMode
 from tqdm import tqdm
 
@@ -45,6 +48,8 @@ MODELS = {
 WAYS = ("reference", "fp32", "bf16")
 WARM_UP = 4  # steps
 STEPS = 40_000  # of the paper's schedule
+KINDS = 14  # of operations in a profile
+BATCHES = 300  # read alone
 MATRIX = 2048  # rows and columns of the product that tells the rate
 
 
@@ -94,11 +99,37 @@ def training_steps(task: Task) -> Iterator[None]:
         yield
 
 
+def profile_of(task: Task, steps: int) -> dict[str, float]:
+    """Milliseconds of a step in each kind of operation, the longest first."""
+    torch.set_num_threads(task.threads)
+    keep_freed_memory()
+    running = training_steps(task)
+    for _ in range(WARM_UP):
+        next(running)
+    with profile(activities=[ProfilerActivity.CPU]) as seen:
+        for _ in range(steps):
+            next(running)
+    times = {event.key: event.self_cpu_time_total / 1000 / steps for event in seen.key_averages()}
+    longest = sorted(times, key=lambda name: -times[name])
+    return {"all": sum(times.values()), **{name: times[name] for name in longest[:KINDS]}}
+
+
 def our_data(cfg: DictConfig) -> PairsDataModule:
     """The data module of a configuration."""
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
     return build_data(typed)
+
+
+def reading_time(cfg: DictConfig) -> float:
+    """Median milliseconds of a batch, once its shards have been opened."""
+    batches = cycle(our_data(cfg).train_dataloader())
+    times = []
+    for _ in range(BATCHES):
+        start = time.perf_counter()
+        next(batches)
+        times.append(1000 * (time.perf_counter() - start))
+    return float(np.median(times))
 
 
 def matrix_rate(threads: int) -> float:
@@ -150,9 +181,10 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=30)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
+    parser.add_argument("--profile", action="store_true", help="also where a bf16 step's time goes")
     parser.add_argument("--output", type=Path, help="JSON file for the figures")
     options = parser.parse_args()
-    figures = {}
+    figures: dict[str, Any] = {"threads": options.threads}
     with tempfile.TemporaryDirectory() as folder:
         common = [
             "scale=laptop",
@@ -162,6 +194,7 @@ def main() -> None:
         ]
         data = our_data(compose_config("train", common))
         export_npz(data.subset("train")[0], Path(folder) / "npz")
+        figures["reading_ms"] = reading_time(compose_config("train", common))
         print(
             f"{'model':<20} {'reference':>9} {'fp32':>5} {'bf16':>5}  ms   "
             f"{'fp32':>5} {'bf16':>5} times   MB        40,000 steps in bf16   floor"
@@ -177,8 +210,17 @@ def main() -> None:
                 flush=True,
             )
             figures[name] = {"reference_ms": reference, "fp32_ms": fp32, "bf16_ms": bf16, "floor_ms": floor}
+            if options.profile:
+                figures[name]["profile_ms"] = profile_of(tasks[-1], options.steps)
+                for kind, spent in figures[name]["profile_ms"].items():
+                    print(f"    {spent:>6.1f} ms  {kind}")
+    fastest = min(figures[name]["bf16_ms"] for name in options.models)
+    reading = figures["reading_ms"]
+    print(
+        f"reading: {reading:.1f} ms a batch, {fastest / reading:.0f} times as fast as the fastest model's step"
+    )
     if options.output:
-        options.output.write_text(json.dumps({"threads": options.threads, **figures}, indent=2) + "\n")
+        options.output.write_text(json.dumps(figures, indent=2) + "\n")
 
 
 if __name__ == "__main__":
