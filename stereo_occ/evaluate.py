@@ -31,11 +31,10 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.baselines.build import build_baseline
-from stereo_occ.checkpoint import KEY, build_task, config_of, plain, read_checkpoint
+from stereo_occ.checkpoint import KEY, config_of, plain, read_checkpoint
 from stereo_occ.checks import check_evaluation
 from stereo_occ.cli import compose_config, entry_point
 from stereo_occ.config import EvaluateConfig
-from stereo_occ.errors import UserError
 from stereo_occ.evaluation_data import (
     GROUPS,
     evaluated_pairs,
@@ -54,7 +53,7 @@ from stereo_occ.metrics_file import training_history, write_json
 from stereo_occ.predictors import LearnedPredictor, Predictor
 from stereo_occ.provenance import environment
 from stereo_occ.quiet import quiet_libraries
-from stereo_occ.task import OccupancyTask
+from stereo_occ.trained import trained_model
 
 logger = logging.getLogger(__name__)
 
@@ -89,11 +88,10 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
         predictor = build_baseline(settings.baseline, training, settings.progress)
     else:
         assert checkpoint is not None
-        task = build_task(trained, load_weights=False)
-        load_weights(task, checkpoint["state_dict"], str(settings.checkpoint))
+        network = trained_model(checkpoint, str(settings.checkpoint))
         facts = {
-            "step": checkpoint["global_step"],
-            "parameters": sum(p.numel() for p in task.model.parameters()),
+            "step": network.step,
+            "parameters": sum(p.numel() for p in network.model.parameters()),
             "trained": {
                 "config": checkpoint[KEY]["config"],
                 "history": training_history(Path(str(settings.checkpoint)), checkpoint),
@@ -101,7 +99,7 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
         }
         hardware = settings.trainer
         predictor = LearnedPredictor(
-            task.model, float(task.threshold), hardware.accelerator, hardware.precision
+            network.model, network.threshold, hardware.accelerator, hardware.precision
         )
     folder.mkdir(parents=True, exist_ok=True)
     meshes = MeshSettings(settings.meshes, settings.mesh_resolution, settings.surface_points)
@@ -145,18 +143,6 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     )
     write_examples(folder, predictor, dataset, settings.examples, settings.mesh_resolution)
     return metrics
-
-
-def load_weights(task: OccupancyTask, state_dict: dict[str, Any], path: str) -> None:
-    """Load the weights of a checkpoint, without heads that only training has."""
-    try:
-        task.load_state_dict(
-            {name: value for name, value in state_dict.items() if not name.startswith("auxiliary.")}
-        )
-    except RuntimeError as error:
-        raise UserError(
-            f"checkpoint={path}: its weights do not fit its configuration; it was written by another version"
-        ) from error
 
 
 def _metrics(result: Measurement, threshold: float) -> dict[str, float]:

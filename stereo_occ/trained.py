@@ -54,15 +54,28 @@ def load_trained(name: str) -> TrainedModel:
             f"checkpoint={name}: no such file, nor the name of shipped weights "
             f"({', '.join(shipped()) or 'there are none'}); give the best.ckpt of a training run"
         )
-    checkpoint = read_checkpoint(Path(name))
+    return trained_model(read_checkpoint(Path(name)), name)
+
+
+def trained_model(checkpoint: Mapping[str, Any], name: str) -> TrainedModel:
+    """The model of a checkpoint that was read, without the heads that only its training had.
+
+    Args:
+        name: of the checkpoint.
+
+    Raises:
+        UserError: its weights are not those of its configuration, or not numbers.
+    """
     cfg = config_of(checkpoint, name)
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
     model = build_model(plain(cfg.model), build_rig(typed.rig, typed.data.image_side), load_weights=False)
-    state = checkpoint["state_dict"]
+    state = {
+        key: value for key, value in checkpoint["state_dict"].items() if not key.startswith("auxiliary.")
+    }
     try:
-        model.load_state_dict({key[6:]: value for key, value in state.items() if key.startswith("model.")})
-        threshold = float(state["threshold"])
+        threshold = float(state.pop("threshold"))
+        model.load_state_dict({key.removeprefix("model."): value for key, value in state.items()})
         step = int(checkpoint["global_step"] or 0)
     except (RuntimeError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise UserError(

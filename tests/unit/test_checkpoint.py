@@ -12,10 +12,10 @@ from stereo_occ.checkpoint import KEY, VERSION, build_task, plain, read_checkpoi
 from stereo_occ.cli import compose_config
 from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
-from stereo_occ.evaluate import load_weights
 from stereo_occ.metrics_file import write_json
 from stereo_occ.provenance import environment
 from stereo_occ.resume import AtomicCheckpoints, step_to_resume
+from stereo_occ.trained import trained_model
 
 
 @pytest.fixture(scope="module")
@@ -80,14 +80,29 @@ def test_another_version(tmp_path, config):
         read_checkpoint(path)
 
 
-def test_weights_that_do_not_fit(config):
+@pytest.mark.parametrize("change", ["missing", "added", "another's", "not a number"])
+def test_weights_that_do_not_fit(config, change):
     task = build_task(training_config(config))
-    with pytest.raises(UserError, match=r"checkpoint=x.ckpt: its weights do not fit"):
-        load_weights(task, {"model.encoder.weight": torch.zeros(1)}, "x.ckpt")
-    other = build_task(compose_config("train", TINY))
-    load_weights(task, other.state_dict(), "x.ckpt")
-    for name, value in task.state_dict().items():
-        assert torch.equal(value, other.state_dict()[name])
+    state = dict(task.state_dict())
+    checkpoint = {KEY: {"version": VERSION, "config": config}, "global_step": 7, "state_dict": state}
+    trained = trained_model(checkpoint, "x.ckpt")
+    assert (trained.step, trained.threshold) == (7, 0.5)
+    for name, value in trained.model.state_dict().items():
+        assert torch.equal(value, task.model.state_dict()[name])
+    trained_model(checkpoint | {"state_dict": state | {"auxiliary.head.bias": torch.zeros(1)}}, "x.ckpt")
+    first = next(name for name in state if name.startswith("model."))
+    match change:
+        case "missing":
+            del state[first]
+        case "added":
+            state["model.more"] = torch.zeros(1)
+        case "another's":
+            state[first] = torch.zeros(1)
+        case "not a number":
+            state[first] = torch.full_like(state[first], torch.nan)
+    complaint = "holds NaN" if change == "not a number" else "its weights do not fit"
+    with pytest.raises(UserError, match=f"checkpoint=x.ckpt: {complaint}"):
+        trained_model(checkpoint, "x.ckpt")
 
 
 def test_saving_replaces_the_old_checkpoint_or_leaves_it(tmp_path, config, monkeypatch):
