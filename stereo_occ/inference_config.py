@@ -21,6 +21,14 @@ class Backend(Enum):
     onnx = "onnx"
 
 
+class Findable(Enum):
+    """What can be looked for in a photograph."""
+
+    mug = "mug"
+    bowl = "bowl"
+    bottle = "bottle"
+
+
 @dataclass
 class ReconstructConfig:
     """``python -m stereo_occ.reconstruct``"""
@@ -36,6 +44,7 @@ class ReconstructConfig:
     right_box: list[float] | None = None
     left_mask: str | None = None  # image files: the object white on black
     right_mask: str | None = None
+    find: Findable | None = None  # in the left image, with torchvision's detector
     center: list[float] | None = None  # of the object, left camera's frame, metres
     size: float | None = None  # diagonal of the object's bounding box, metres
     threshold: float | None = None  # occupancy probability at the surface; null: the checkpoint's

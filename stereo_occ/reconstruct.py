@@ -70,6 +70,7 @@ def reconstruct_pair(cfg: DictConfig) -> Reconstruction:
         calibration_files(cfg),
         boxes=(settings.left_box, settings.right_box),
         masks=(settings.left_mask, settings.right_mask),
+        find=settings.find and settings.find.value,
         center=settings.center,
         size=settings.size,
         unit=settings.unit,

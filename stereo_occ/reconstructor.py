@@ -165,6 +165,7 @@ class Reconstructor:
         *,
         boxes: Pair = (None, None),
         masks: Pair = (None, None),
+        find: str | None = None,
         center: Sequence[float] | None = None,
         size: float | None = None,
         unit: str | float | None = None,
@@ -180,7 +181,9 @@ class Reconstructor:
             boxes: around the object in each image: left, top, right, bottom, pixels. What is given for one image alone
                 is looked for in the other.
             masks: image files or boolean ``(H, W)``, where the object is. Without boxes and masks: the images'
-                transparency, else ``center`` and ``size``, else what stands out from a plain background.
+                transparency, else what ``find`` finds, else ``center`` and ``size``, else what stands out from a plain
+                background.
+            find: mug, bowl or bottle: the likeliest one in the left image, by a detector that is fetched once.
             center: of the object, left camera's frame, metres; triangulated if None.
             size: diagonal of the object's bounding box, metres; from the boxes if None.
 
@@ -195,7 +198,7 @@ class Reconstructor:
         on_object = isinstance(self.config.rig, RectifiedRigConfig)
         given = center is not None and size is not None
         with _timed(seconds, "locate"):
-            found = locate_pair(pair, photos, boxes, masks, required=on_object and not given)
+            found = locate_pair(pair, photos, boxes, masks, find, required=on_object and not given)
         with _timed(seconds, "frame"):
             framing = self._frame(pair, found, center, size)
             views = self._views(pair, photos, found, framing)

@@ -1,6 +1,7 @@
 """What holds for every test."""
 
 import os
+from urllib.error import URLError
 
 import pytest
 import torch
@@ -23,3 +24,18 @@ def egl():
         process_renderer(8, 8)
     except UserError as error:
         pytest.skip(str(error))
+
+
+@pytest.fixture
+def torch_cache(tmp_path, monkeypatch):
+    """An empty torch cache and no network."""
+
+    def no_network(*args: object, **kwargs: object):
+        raise URLError("no network")
+
+    monkeypatch.setattr(torch.hub, "download_url_to_file", no_network)
+    directory = torch.hub.get_dir()
+    torch.hub.set_dir(tmp_path)
+    (tmp_path / "checkpoints").mkdir()
+    yield tmp_path / "checkpoints"
+    torch.hub.set_dir(directory)

@@ -115,7 +115,8 @@ class ResNet18(ImageEncoder):
         source = named_weights(weights) if weights else None
         network = resnet18()
         if source and load_weights:
-            network.load_state_dict(fetch(source))
+            remedy = "train from scratch with model.encoder.weights=null"
+            network.load_state_dict(fetch(source, "model.encoder.weights", remedy))
         stages = (network.layer1, network.layer2, network.layer3, network.layer4)
         kept = stages[: self.stride.bit_length() - 2]  # the first is at stride 4
         self.channels = 64 * self.stride // 4

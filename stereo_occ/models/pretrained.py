@@ -1,10 +1,10 @@
-"""ImageNet weights through torchvision's own interface."""
+"""Trained weights through torchvision's own interface."""
 
 from pathlib import Path
 from typing import Any
 
 import torch
-from torchvision.models import ResNet18_Weights
+from torchvision.models import ResNet18_Weights, WeightsEnum
 
 from stereo_occ.errors import UserError
 
@@ -23,8 +23,12 @@ def named_weights(name: str) -> ResNet18_Weights:
     return ResNet18_Weights[name]
 
 
-def fetch(weights: ResNet18_Weights) -> dict[str, Any]:
+def fetch(weights: WeightsEnum, key: str, remedy: str) -> dict[str, Any]:
     """The state dict, from torch's cache or else from the network.
+
+    Args:
+        key: of the setting that asks for it.
+        remedy: what else can be done.
 
     Raises:
         UserError: if it is in neither.
@@ -34,6 +38,5 @@ def fetch(weights: ResNet18_Weights) -> dict[str, Any]:
         return dict(weights.get_state_dict(progress=False, check_hash=True, weights_only=True))
     except (OSError, RuntimeError) as error:
         raise UserError(
-            f"model.encoder.weights: {weights.name} is not at {cached} and cannot be fetched ({error}); "
-            "put the file there, or train from scratch with model.encoder.weights=null"
+            f"{key}: {weights} is not at {cached} and cannot be fetched ({error}); put the file there, or {remedy}"
         ) from error

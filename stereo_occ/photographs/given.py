@@ -30,7 +30,12 @@ def photo_of(image: ImageFile, name: str) -> Photo:
 
 
 def locate_pair(
-    pair: RealPair, photos: tuple[Photo, Photo], boxes: Pair, masks: Pair, required: bool
+    pair: RealPair,
+    photos: tuple[Photo, Photo],
+    boxes: Pair,
+    masks: Pair,
+    find: str | None,
+    required: bool,
 ) -> tuple[Found, Found] | None:
     """Where the object is in both images, or None where that is neither given nor ``required``.
 
@@ -38,6 +43,7 @@ def locate_pair(
 
     Args:
         pair: fitted to the photographs.
+        find: what to detect in the left image where no box and no mask says where it is: mug, bowl or bottle.
 
     Raises:
         UserError: it is given wrongly, or not found though it is required.
@@ -47,6 +53,11 @@ def locate_pair(
         return in_left, in_right or matched(pair, photos, in_left, 0)
     if in_right is not None:
         return matched(pair, photos, in_right, 1), in_right
+    if find is not None:
+        from stereo_occ.photographs.detect import detected  # all of torchvision's detectors, for this alone
+
+        in_left = detected(photos[0], find, SIDES[0])
+        return in_left, matched(pair, photos, in_left, 0)
     if not required:
         return None
     left, right = (

@@ -91,7 +91,7 @@ def on_plain_background(rgb_HW3: NDArray[np.uint8], name: str) -> Found:
     """
     border_N3 = np.concatenate([rgb_HW3[0], rgb_HW3[-1], rgb_HW3[:, 0], rgb_HW3[:, -1]]).astype(np.int16)
     color_3 = np.median(border_N3, axis=0)
-    advice = f"give {name}_box=[left,top,right,bottom] or {name}_mask=MASK.png"
+    advice = f"give {name}_box=[left,top,right,bottom] or {name}_mask=MASK.png, or find=mug (or bowl, bottle)"
     if (np.abs(border_N3 - color_3).max(axis=1) <= CONTRAST).mean() < PLAIN:
         raise UserError(f"{name}: its background is not plain, so the object cannot be found; {advice}")
     differs_HW = np.abs(rgb_HW3.astype(np.int16) - color_3.astype(np.int16)).max(axis=2) > CONTRAST

@@ -2,7 +2,6 @@
 
 import sys
 from types import ModuleType, SimpleNamespace
-from urllib.error import URLError
 
 import pytest
 import torch
@@ -19,21 +18,6 @@ from stereo_occ.models.timm_encoder import TimmEncoder
 DILATED = {"channels": 16, "widths": [32, 64, 128], "blocks": [3, 4, 8], "dilations": [1, 2, 5, 9]}
 LIGHT = {"channels": 32, "widths": [16, 32, 64, 128], "blocks": [1, 2, 2, 2]}
 WEIGHTS_FILE = "resnet18-f37072fd.pth"
-
-
-@pytest.fixture
-def torch_cache(tmp_path, monkeypatch):
-    """An empty torch cache and no network."""
-
-    def no_network(*args: object, **kwargs: object):
-        raise URLError("no network")
-
-    monkeypatch.setattr(torch.hub, "download_url_to_file", no_network)
-    directory = torch.hub.get_dir()
-    torch.hub.set_dir(tmp_path)
-    (tmp_path / "checkpoints").mkdir()
-    yield tmp_path / "checkpoints"
-    torch.hub.set_dir(directory)
 
 
 @pytest.mark.parametrize(

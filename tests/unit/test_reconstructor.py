@@ -20,6 +20,7 @@ from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.crop import Box
 from stereo_occ.models.sampling import project_points, sample_maps
+from stereo_occ.photographs import detect
 from stereo_occ.reconstructor import Reconstructor, SurfaceOptions
 
 CENTER, RADIUS = np.array([0.05, 0.04, 0.6]), 0.05
@@ -131,6 +132,18 @@ def test_a_box_in_one_image_is_found_in_the_other(name, index):
     result = on_object()(*images, pair, boxes=boxes, surface=COARSE)
     assert result.found[1 - index].how == f"like the {'right' if index else 'left'} one"
     np.testing.assert_allclose(list(vars(result.found[1 - index].box).values()), truth[1 - index], atol=2)
+
+
+def test_what_is_detected_on_the_left_is_found_on_the_right(monkeypatch):
+    pair = PAIRS["turned"]
+    images = [photograph(camera) for camera in pair.cameras]
+    box_4 = torch.tensor(list(vars(box_of(images[0])).values()))
+    cup = detect.WEIGHTS.meta["categories"].index("cup")
+    said = (box_4[None] + 0.5, torch.tensor([cup]), torch.tensor([0.9]))
+    monkeypatch.setattr(detect, "detections", lambda photo: said)
+    result = on_object()(*images, pair, find="mug", surface=COARSE)
+    assert [part.how for part in result.found] == ["detected with 0.90", "like the left one"]
+    check_outline(result, images)
 
 
 def test_the_size_of_the_images_does_not_matter():
