@@ -23,18 +23,23 @@ PROBED = (300, 600, 900, 1200, 2100, 3000)  # steps
 BEGIN, END = "<!-- results:begin -->", "<!-- results:end -->"
 FLOORS = HERE / "floors"
 BASELINES = ("visual_hull", "sgm", "mean_shape", "nearest_shape", "truth")
-SHORT, RECIPE, FIELD = HERE / "laptop_4k", HERE / "recipe_10k", HERE / "field"
+SHORT, RECIPE, LONGER, FREE, FIELD = (
+    HERE / name for name in ("laptop_4k", "recipe_10k", "recipe_20k", "free_10k", "field")
+)
+AIDED = "model=plane_sweep_stereo auxiliary=mask_depth"
 RUNS = {
     SHORT / "mono": "model=mono model.encoder.weights=null steps=4000",
     SHORT / "stereo": "model=stereo steps=4000",
     RECIPE / "mono_scratch": "experiment=recipe model=mono_scratch steps=10000",
     RECIPE / "stereo": "experiment=recipe model=stereo steps=10000",
     RECIPE / "plane_sweep_stereo": "experiment=recipe model=plane_sweep_stereo steps=10000",
-    RECIPE / "plane_sweep_stereo_aided": (
-        "experiment=recipe model=plane_sweep_stereo auxiliary=mask_depth steps=10000"
-    ),
+    RECIPE / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=10000",
+    LONGER / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=20000",
+    FREE / "mono_scratch": "experiment=recipe placement=free model=mono_scratch steps=10000",
+    FREE / "plane_sweep_stereo_aided": f"experiment=recipe placement=free {AIDED} steps=10000",
 }
-MONO = RECIPE / "mono_scratch"
+#: What the others of a family are compared with.
+MONO = "mono_scratch"
 WITH_INTERVALS = (
     "iou", "iou_bbox", "iou_unrotated", "handle_recall", "neck_recall", "cavity_empty", "chamfer_l1",
     "height_error", "width_error",
@@ -64,14 +69,15 @@ def table() -> str:
 def summary() -> dict[str, Any]:
     """Every run's metrics with their intervals, and what it has over mono."""
     runs: dict[str, Any] = {}
-    for folder in (*(folder for folder in RUNS if folder.parent == RECIPE), FIELD):
+    for folder in (*(folder for folder in RUNS if folder.parent != SHORT), FIELD):
+        mono = folder.with_name(MONO)
         run: dict[str, Any] = {"settings": RUNS.get(folder, "experiment=field")}
         for where in ("test", "real"):
             facts = json.loads((folder / f"{where}.json").read_text())
             run["parameters"] = facts["parameters"]
             run[where] = {"objects": facts["objects"], "metrics": _differences(folder, None, where)}
-            if folder.parent == RECIPE and folder != MONO:
-                run[where]["over mono_scratch"] = _differences(folder, MONO, where)
+            if mono in RUNS and folder != mono:
+                run[where]["over mono_scratch"] = _differences(folder, mono, where)
         runs[str(folder.relative_to(HERE))] = run
     return runs
 

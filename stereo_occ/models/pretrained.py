@@ -1,5 +1,6 @@
 """Trained weights through torchvision's own interface."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ def fetch(weights: WeightsEnum, key: str, remedy: str) -> dict[str, Any]:
     """
     cached = Path(torch.hub.get_dir()) / "checkpoints" / weights.url.rsplit("/", 1)[-1]
     try:
-        return dict(weights.get_state_dict(progress=False, check_hash=True, weights_only=True))
+        return dict(weights.get_state_dict(progress=sys.stderr.isatty(), check_hash=True, weights_only=True))
     except (OSError, RuntimeError) as error:
         raise UserError(
             f"{key}: {weights} is not at {cached} and cannot be fetched ({error}); put the file there, or {remedy}"

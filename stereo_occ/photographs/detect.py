@@ -53,7 +53,7 @@ def detected(photo: Photo, what: str, name: str) -> Found:
 
 def detections(photo: Photo) -> tuple[Tensor, Tensor, Tensor]:
     """Boxes ``(N, 4)`` from the image's outer edge, COCO's labels ``(N,)`` and scores ``(N,)``, best first."""
-    image_CHW = torch.as_tensor(photo.rgb_HW3).permute(2, 0, 1).float() / 255
+    image_CHW = torch.tensor(photo.rgb_HW3).permute(2, 0, 1).float() / 255
     with torch.inference_mode():
         (found,) = _detector()([image_CHW])
     return found["boxes"], found["labels"], found["scores"]

@@ -10,6 +10,7 @@ from stereo_occ.photographs import detect
 from stereo_occ.photographs.photo import Photo
 
 PHOTO = Photo(np.random.default_rng(0).integers(256, size=(60, 80, 3), dtype=np.uint8))
+PHOTO.rgb_HW3.flags.writeable = False  # as Pillow gives them
 FILE = "fasterrcnn_mobilenet_v3_large_fpn-fb6a3cc7.pth"
 
 

@@ -1,0 +1,10 @@
+#!/usr/bin/env bash
+# What stereo is for: size and distance unknown (placement=free), mono and the best model, on a quarter of the paper's
+# schedule. Results go beside this file.
+set -euo pipefail
+family=free_10k
+source "$(dirname "$0")/../recipe.sh"
+
+learn mono_scratch 10000 placement=free model=mono_scratch
+learn plane_sweep_stereo_aided 10000 placement=free model=plane_sweep_stereo auxiliary=mask_depth
+against aided_against_mono plane_sweep_stereo_aided mono_scratch
