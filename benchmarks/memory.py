@@ -2,7 +2,8 @@
 
     python -m stereo_occ.train model=stereo & python -m benchmarks.memory $! --output memory.csv
 
-Growth is the slope of a straight line through what was seen after the first ten minutes.
+Growth is the slope of a straight line through what was seen after the first ten minutes; of shorter runs, in their
+second half.
 """
 
 import argparse
@@ -57,6 +58,8 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("memory.csv"))
     options = parser.parse_args()
     watch(options.pid, options.every, options.output)
+    if len(options.output.read_text().splitlines()) < 5:
+        parser.error(f"{options.pid}: no such process, not yours, or it ended too soon")
     print(summary(options.output))
 
 

@@ -123,7 +123,7 @@ def our_data(cfg: DictConfig) -> PairsDataModule:
 
 def reading_time(cfg: DictConfig) -> float:
     """Median milliseconds of a batch, once its shards have been opened."""
-    batches = cycle(our_data(cfg).train_dataloader())
+    batches = iter(our_data(cfg).train_dataloader())
     times = []
     for _ in range(BATCHES):
         start = time.perf_counter()
@@ -184,6 +184,7 @@ def main() -> None:
     parser.add_argument("--profile", action="store_true", help="also where a bf16 step's time goes")
     parser.add_argument("--output", type=Path, help="JSON file for the figures")
     options = parser.parse_args()
+    torch.set_num_threads(options.threads)
     figures: dict[str, Any] = {"threads": options.threads}
     with tempfile.TemporaryDirectory() as folder:
         common = [

@@ -26,6 +26,6 @@ learn() { # name, steps, overrides
     fi
 }
 
-against() { # folder, A, B: what A has over B on test objects
-    .venv/bin/python -m stereo_occ.compare "$runs/$2/test_best" "$runs/$3/test_best" --output "$here/$1"
+against() { # folder, A, B: what A has over B on test objects; family/name of each
+    .venv/bin/python -m stereo_occ.compare "outputs/$2/test_best" "outputs/$3/test_best" --output "$here/$1"
 }

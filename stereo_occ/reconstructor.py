@@ -178,11 +178,10 @@ class Reconstructor:
             left, right: image files, or RGB ``(H, W, 3)``.
             rig: calibration, or its files; see :func:`~stereo_occ.calibration.read_calibration`, also for ``unit``
                 and ``rectified``.
-            boxes: around the object in each image: left, top, right, bottom, pixels. What is given for one image alone
-                is looked for in the other.
-            masks: image files or boolean ``(H, W)``, where the object is. Without boxes and masks: the images'
-                transparency, else what ``find`` finds, else ``center`` and ``size``, else what stands out from a plain
-                background.
+            boxes: around the object in each image: left, top, right, bottom, pixels. One is enough.
+            masks: image files or boolean ``(H, W)``, where the object is. One counts as its box. Without boxes and
+                masks: the images' transparency, else what ``find`` finds, else ``center`` and ``size``, else what
+                stands out from a plain background.
             find: mug, bowl or bottle: the likeliest one in the left image, by a detector that is fetched once.
             center: of the object, left camera's frame, metres; triangulated if None.
             size: diagonal of the object's bounding box, metres; from the boxes if None.
@@ -200,7 +199,7 @@ class Reconstructor:
         with _timed(seconds, "locate"):
             found = locate_pair(pair, photos, boxes, masks, find, required=on_object and not given)
         with _timed(seconds, "frame"):
-            framing = self._frame(pair, found, center, size)
+            framing = self._frame(pair, found, find, center, size)
             views = self._views(pair, photos, found, framing)
         with _timed(seconds, "encode"):
             occupancy = self.predict(views)
@@ -242,6 +241,7 @@ class Reconstructor:
         self,
         pair: RealPair,
         found: tuple[Found, Found] | None,
+        find: str | None,
         center: Sequence[float] | None,
         size: float | None,
     ) -> Framing:
@@ -251,10 +251,10 @@ class Reconstructor:
             if center_3 is not None and (center_3.shape != (3,) or not np.isfinite(center_3).all()):
                 raise UserError(f"center={list(center or [])}: must be [x,y,z] in metres")
             return frame_on_object(pair, config, self.config.placement.kind, side, found, center_3, size)
-        if center is not None or size is not None:
+        if (find, center, size) != (None, None, None):
             raise UserError(
-                f"center, size: the checkpoint {self.name} looks at the whole view about the point where the cameras' "
-                f"axes meet, so these have no effect; leave them out"
+                f"find, center, size: the checkpoint {self.name} looks at the whole view about the point where the "
+                f"cameras' axes meet, so these have no effect; leave them out"
             )
         return frame_on_fixation(pair, config, side)
 
@@ -264,7 +264,8 @@ class Reconstructor:
         """What the model is given: cut, straightened, and behind the object what it was trained with."""
         background = self.config.background
         masks = None if found is None or found[0].mask_HW is None or found[1].mask_HW is None else found
-        if background.masked == 1 and masks is None:
+        one_mask = found is not None and (found[0].mask_HW is None) != (found[1].mask_HW is None)
+        if masks is None and (background.masked == 1 or (one_mask and background.clutter is None)):
             raise UserError(
                 f"the checkpoint {self.name} was trained on pictures without a background: give left_mask= and "
                 f"right_mask=, or images that are transparent around the object"

@@ -169,12 +169,13 @@ def main() -> None:
                     told = tell(pair, np.random.default_rng(number))
                     values[way].append(measured(reconstruct, pair, told))
                 except UserError:
-                    values[way].append([0.0, *[np.nan] * 3])
+                    values[way].append([0.0, *[np.inf] * 3])
         for way, rows in values.items():
             iou_P, *errors_3P = np.array(rows).T
-            medians = dict(zip(COLUMNS[1:], np.nanmedian(errors_3P, axis=1).tolist(), strict=True))
-            failed = int(np.isnan(errors_3P[0]).sum())
-            results[f"{background}, {way}"] = {"iou": float(iou_P.mean()), **medians, "failed": failed}
+            medians = dict(zip(COLUMNS[1:], np.median(errors_3P, axis=1).tolist(), strict=True))
+            failed = int(np.isinf(errors_3P[0]).sum())
+            known = {name: value if np.isfinite(value) else None for name, value in medians.items()}
+            results[f"{background}, {way}"] = {"iou": float(iou_P.mean()), **known, "failed": failed}
             errors = " | ".join(f"{1000 * value:.0f} mm" for value in medians.values())
             lines.append(f"| {background} | {way} | {iou_P.mean():.3f} | {errors} | {failed} |")
     (HERE / "results.json").write_text(json.dumps(results, indent=1) + "\n")

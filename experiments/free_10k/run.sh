@@ -7,4 +7,4 @@ source "$(dirname "$0")/../recipe.sh"
 
 learn mono_scratch 10000 placement=free model=mono_scratch
 learn plane_sweep_stereo_aided 10000 placement=free model=plane_sweep_stereo auxiliary=mask_depth
-against aided_against_mono plane_sweep_stereo_aided mono_scratch
+against aided_against_mono $family/plane_sweep_stereo_aided $family/mono_scratch

@@ -9,7 +9,7 @@ learn mono_scratch 10000 model=mono_scratch
 learn stereo 10000 model=stereo
 learn plane_sweep_stereo 10000 model=plane_sweep_stereo
 learn plane_sweep_stereo_aided 10000 model=plane_sweep_stereo auxiliary=mask_depth
-against stereo_against_mono plane_sweep_stereo mono_scratch
-against paper_stereo_against_mono stereo mono_scratch
-against aided_against_mono plane_sweep_stereo_aided mono_scratch
-against aided_against_unaided plane_sweep_stereo_aided plane_sweep_stereo
+against stereo_against_mono $family/plane_sweep_stereo $family/mono_scratch
+against paper_stereo_against_mono $family/stereo $family/mono_scratch
+against aided_against_mono $family/plane_sweep_stereo_aided $family/mono_scratch
+against aided_against_unaided $family/plane_sweep_stereo_aided $family/plane_sweep_stereo

@@ -5,9 +5,7 @@ set -euo pipefail
 family=recipe_20k
 source "$(dirname "$0")/../recipe.sh"
 
-mkdir -p "$here"
 learn plane_sweep_stereo_aided 20000 model=plane_sweep_stereo auxiliary=mask_depth
-.venv/bin/python -m stereo_occ.compare "$runs/plane_sweep_stereo_aided/test_best" \
-    outputs/recipe_10k/plane_sweep_stereo_aided/test_best --output "$here/against_half_the_schedule"
+against half_the_schedule $family/plane_sweep_stereo_aided recipe_10k/plane_sweep_stereo_aided
 .venv/bin/python -m stereo_occ.export checkpoint="$runs/plane_sweep_stereo_aided/best.ckpt" \
     output=stereo_occ/weights/paper_rig metrics="$here/plane_sweep_stereo_aided/test.json"

@@ -11,7 +11,7 @@ from torch.nn.functional import interpolate, relu
 from torchvision.models import resnet18
 
 from stereo_occ.errors import UserError
-from stereo_occ.models.pretrained import fetch, named_weights
+from stereo_occ.models.pretrained import load_pretrained, named_weights
 from stereo_occ.models.residual import NormActivation, ResidualBlock
 
 RELU = partial(relu, inplace=True)
@@ -116,7 +116,7 @@ class ResNet18(ImageEncoder):
         network = resnet18()
         if source and load_weights:
             remedy = "train from scratch with model.encoder.weights=null"
-            network.load_state_dict(fetch(source, "model.encoder.weights", remedy))
+            load_pretrained(network, source, "model.encoder.weights", remedy)
         stages = (network.layer1, network.layer2, network.layer3, network.layer4)
         kept = stages[: self.stride.bit_length() - 2]  # the first is at stride 4
         self.channels = 64 * self.stride // 4

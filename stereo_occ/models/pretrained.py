@@ -2,9 +2,10 @@
 
 import sys
 from pathlib import Path
-from typing import Any
+from pickle import UnpicklingError
 
 import torch
+from torch import nn
 from torchvision.models import ResNet18_Weights, WeightsEnum
 
 from stereo_occ.errors import UserError
@@ -24,20 +25,24 @@ def named_weights(name: str) -> ResNet18_Weights:
     return ResNet18_Weights[name]
 
 
-def fetch(weights: WeightsEnum, key: str, remedy: str) -> dict[str, Any]:
-    """The state dict, from torch's cache or else from the network.
+def load_pretrained(network: nn.Module, weights: WeightsEnum, key: str, remedy: str) -> None:
+    """Give a network its weights, from torch's cache or else from the network.
 
     Args:
         key: of the setting that asks for it.
         remedy: what else can be done.
 
     Raises:
-        UserError: if it is in neither.
+        UserError: if they are in neither, or what is in the cache is not they.
     """
     cached = Path(torch.hub.get_dir()) / "checkpoints" / weights.url.rsplit("/", 1)[-1]
     try:
-        return dict(weights.get_state_dict(progress=sys.stderr.isatty(), check_hash=True, weights_only=True))
-    except (OSError, RuntimeError) as error:
+        state = weights.get_state_dict(progress=sys.stderr.isatty(), check_hash=True, weights_only=True)
+        network.load_state_dict(dict(state))
+    except (OSError, RuntimeError, EOFError, UnpicklingError, AttributeError, TypeError, ValueError) as error:
+        if cached.is_file():
+            raise UserError(f"{key}: {cached} does not hold {weights}; delete it, or {remedy}") from error
+        reason = str(error).partition("\n")[0]
         raise UserError(
-            f"{key}: {weights} is not at {cached} and cannot be fetched ({error}); put the file there, or {remedy}"
+            f"{key}: {weights} is not at {cached} and cannot be fetched ({reason}); put the file there, or {remedy}"
         ) from error

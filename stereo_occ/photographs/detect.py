@@ -15,7 +15,7 @@ from torchvision.models.detection import (
 
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.crop import Box
-from stereo_occ.models.pretrained import fetch
+from stereo_occ.models.pretrained import load_pretrained
 from stereo_occ.photographs.locate import Found, outline_of
 from stereo_occ.photographs.photo import Photo
 
@@ -35,8 +35,10 @@ def detected(photo: Photo, what: str, name: str) -> Found:
         name: of the photograph, for messages.
 
     Raises:
-        UserError: there is none, or the detector cannot be fetched.
+        UserError: nothing else can be looked for, there is none, or the detector cannot be fetched.
     """
+    if what not in NAMES:
+        raise UserError(f"find={what}: must be one of {', '.join(NAMES)}")
     boxes_N4, labels_N, scores_N = detections(photo)
     wanted = WEIGHTS.meta["categories"].index(NAMES[what])
     scores_N = torch.where(labels_N == wanted, scores_N, 0.0)
@@ -62,6 +64,6 @@ def detections(photo: Photo) -> tuple[Tensor, Tensor, Tensor]:
 @cache
 def _detector() -> nn.Module:
     network: nn.Module = fasterrcnn_mobilenet_v3_large_fpn(weights=None, weights_backbone=None)
-    network.load_state_dict(fetch(WEIGHTS, "find", "give left_box=[left,top,right,bottom]"))
+    load_pretrained(network, WEIGHTS, "find", "give left_box=[left,top,right,bottom]")
     network.eval()
     return network

@@ -39,7 +39,7 @@ def locate_pair(
 ) -> tuple[Found, Found] | None:
     """Where the object is in both images, or None where that is neither given nor ``required``.
 
-    What is given for one image alone is looked for in the other.
+    What is given for one image alone is looked for in the other, if it is ``required``.
 
     Args:
         pair: fitted to the photographs.
@@ -49,11 +49,13 @@ def locate_pair(
         UserError: it is given wrongly, or not found though it is required.
     """
     in_left, in_right = (_given(*part) for part in zip(photos, boxes, masks, SIDES, strict=True))
-    if in_left is not None:
-        return in_left, in_right or matched(pair, photos, in_left, 0)
-    if in_right is not None:
+    if in_left is not None and in_right is not None:
+        return in_left, in_right
+    if in_left is not None and required:
+        return in_left, matched(pair, photos, in_left, 0)
+    if in_right is not None and required:
         return matched(pair, photos, in_right, 1), in_right
-    if find is not None:
+    if find is not None and required:
         from stereo_occ.photographs.detect import detected  # all of torchvision's detectors, for this alone
 
         in_left = detected(photos[0], find, SIDES[0])

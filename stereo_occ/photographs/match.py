@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stereo_occ.calibration import RealPair
+from stereo_occ.calibration import RealCamera, RealPair
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import Camera
 from stereo_occ.geometry.crop import Box
@@ -55,8 +55,14 @@ def matched(pair: RealPair, photos: tuple[Photo, Photo], known: Found, index: in
     width = box.right - box.left
     scale = min(1.0, COMPARED / max(width, box.bottom - box.top))
     farthest_apart = rig.left.K[0, 0] * pair.baseline / NEAREST
-    first = box.left - (0 if other == 0 else farthest_apart) - REACH * width
-    last = box.right + (farthest_apart if other == 0 else 0) + REACH * width
+    seen_from, seen_to = _columns(rig.cameras[other], pair.cameras[other])
+    first = max(seen_from, box.left - (0 if other == 0 else farthest_apart)) - REACH * width
+    last = min(seen_to, box.right + (farthest_apart if other == 0 else 0)) + REACH * width
+    if last - first < width:
+        raise UserError(
+            f"{SIDES[other]}: what is in the {SIDES[index]} image there is not in this one; check the box and the "
+            f"calibration"
+        )
     part_HWC, row_HWC = (
         seen_by(photos[i].rgb_HW3, pair.cameras[i], _rows(rig.cameras[i], box, left, right, scale)) / 255
         for i, left, right in ((index, box.left, box.right), (other, first, last))
@@ -109,6 +115,17 @@ def _edges(part_HWC: NDArray[np.float64], row_HXC: NDArray[np.float64], whole: S
     return shifts[0], shifts[1]
 
 
+def _columns(rectified: Camera, camera: RealCamera) -> tuple[float, float]:
+    """From where to where a photograph reaches in its rectified image, in every row."""
+    width, height = rectified.width, rectified.height
+    v_N = np.linspace(-0.5, height - 0.5, 9)
+    left_N, right_N = (
+        pixels_in(rectified, camera, np.stack([np.full_like(v_N, u), v_N], axis=1))[:, 0]
+        for u in (-0.5, width - 0.5)
+    )
+    return float(left_N.max()), float(right_N.min())
+
+
 def _middle(height: int, width: int) -> NDArray[np.float64]:
     """More weight to the middle of a box, where the object is."""
     v_H1, u_1W = (np.linspace(-1, 1, count) for count in (height, width))
@@ -118,5 +135,5 @@ def _middle(height: int, width: int) -> NDArray[np.float64]:
 def _rows(camera: Camera, box: Box, left: float, right: float, scale: float) -> Camera:
     """The box's rows of a rectified camera, from one column to another."""
     to_part = np.array([[scale, 0, -scale * left - 0.5], [0, scale, -scale * box.top - 0.5], [0, 0, 1]])
-    size = round(scale * (right - left)), round(scale * (box.bottom - box.top))
+    size = max(1, round(scale * (right - left))), max(1, round(scale * (box.bottom - box.top)))
     return Camera(to_part @ camera.K, camera.camera_from_rig, *size)

@@ -53,7 +53,9 @@ class ClutterConfig:
     period: list[float] = MISSING  # of a pattern, log-uniform
     roughness: list[float] = MISSING  # 0 to 1
     occlusion: float = MISSING  # share of the object's width that a nearer thing may hide
-    photographs: float = 0.0  # share of tables and walls that show a photograph, one of scikit-image's
+    photographs: float | None = (
+        None  # share of tables and walls that show a photograph, one of scikit-image's
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,7 +244,7 @@ def _visible(
 
 def _surface(config: ClutterConfig, rng: np.random.Generator) -> tuple[Solid, NDArray[np.float64] | None]:
     """A plane, with the colours of its vertices if it shows a photograph."""
-    if rng.random() >= share(config.photographs, "background.clutter.photographs"):
+    if rng.random() >= share(config.photographs or 0, "background.clutter.photographs"):
         return plane(), None
     name = PHOTOGRAPHS[int(rng.integers(len(PHOTOGRAPHS)))]
     side = float(np.exp(rng.uniform(*np.log(PICTURED))))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d, shift
 
-from stereo_occ.photographs.match import best_shift
+from stereo_occ.photographs.match import Shift, _edges, best_shift
 
 
 def texture(width):
@@ -34,3 +34,25 @@ def test_exposure_does_not_matter_and_weights_do():
 
 def test_a_part_without_any_structure_is_found_nowhere():
     assert best_shift(np.ones((20, 40, 3)), texture(100), np.ones((20, 40))).correlation < 1e-6
+
+
+def nearer_in_the_middle():
+    """A part whose middle is 40 columns on in the row, and its edges 37."""
+    part_HWC = texture(60)
+    row_HXC = texture(300)[:, 100:260].copy()
+    row_HXC[:, 37:97] = part_HWC
+    row_HXC[:, 55:85] = part_HWC[:, 15:45]
+    return part_HWC, row_HXC
+
+
+def test_edges_farther_back_than_the_middle_have_a_shift_of_their_own():
+    part_HWC, row_HXC = nearer_in_the_middle()
+    assert _edges(part_HWC, row_HXC, Shift(40, 0.9)) == pytest.approx((37, 37), abs=0.3)
+
+
+def test_an_edge_that_is_not_seen_stays_with_the_whole():
+    part_HWC, row_HXC = nearer_in_the_middle()
+    row_HXC[:, 30:50] = 0.5
+    left, right = _edges(part_HWC, row_HXC, Shift(40, 0.9))
+    assert left == 40
+    assert right == pytest.approx(37, abs=0.3)

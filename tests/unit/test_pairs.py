@@ -81,6 +81,11 @@ def test_data_sets_of_the_papers_setting_keep_their_names(scale, name):
     assert prepare._folder_name(pairs).endswith(f"px_{name}")
 
 
+def test_the_data_set_of_the_shipped_weights_keeps_its_name():
+    pairs = OmegaConf.to_object(compose_config("train", ["experiment=field"]))
+    assert prepare._folder_name(pairs) == "procedural_96px_ee7a14aaee"
+
+
 def test_every_variation_has_a_data_set_of_its_own():
     changes = [
         "texture=own", "texture=procedural", "sensor=noisy", "sensor.blur=[0,1]", "background=clutter",

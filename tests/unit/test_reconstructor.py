@@ -79,8 +79,8 @@ def reconstructor(*overrides):
     return Reconstructor(training(*overrides), silhouettes, 0.5, "silhouettes")
 
 
-def on_object():
-    return reconstructor("rig=rectified", "placement=free")
+def on_object(*overrides):
+    return reconstructor("rig=rectified", "placement=free", *overrides)
 
 
 def middle(mesh):
@@ -132,6 +132,49 @@ def test_a_box_in_one_image_is_found_in_the_other(name, index):
     result = on_object()(*images, pair, boxes=boxes, surface=COARSE)
     assert result.found[1 - index].how == f"like the {'right' if index else 'left'} one"
     np.testing.assert_allclose(list(vars(result.found[1 - index].box).values()), truth[1 - index], atol=2)
+
+
+def test_what_the_other_image_does_not_show_is_not_found_there():
+    """At the left edge of the left image; the right camera sees that part of the world outside of its own."""
+    pair = PAIRS["parallel"]
+    images = [np.full((H, W, 3), 255, np.uint8) for _ in range(2)]
+    for image in images:
+        image[190:] = 60
+    images[0][150:230, 5:35] = [200, 40, 40]
+    with pytest.raises(UserError, match=r"right: (what is in the left|nothing in it)"):
+        on_object()(*images, pair, boxes=([0, 140, 40, 240], None), surface=COARSE)
+
+
+def test_a_strong_lens_and_a_wide_baseline_leave_the_search_in_the_image():
+    K = np.array([[533.0, 0, 319.5], [0, 533, 239.5], [0, 0, 1]])
+    lens = Lens.from_list([-0.2656, -0.0467, 0.0018, -0.0003, 0.2523])
+    pose = np.eye(4)
+    pose[0, 3] = -0.4
+    pair = RealPair(RealCamera(K, lens, np.eye(4), (640, 480)), RealCamera(K, lens, pose, (640, 480)))
+    for x in (0.15, 0.3):
+        images = [photograph(camera, np.array([x, 0.1, 1.0]), 0.08) for camera in pair.cameras]
+        left, right = (list(vars(box_of(image)).values()) for image in images)
+        result = on_object()(*images, pair, boxes=(left, None), surface=COARSE)
+        np.testing.assert_allclose(list(vars(result.found[1].box).values()), right, atol=2)
+
+
+def test_one_mask_is_a_box_and_not_enough_where_pictures_had_no_background():
+    pair = PAIRS["parallel"]
+    images = [photograph(camera) for camera in pair.cameras]
+    mask = images[0].min(axis=2) < 128
+    with pytest.raises(
+        UserError, match="trained on pictures without a background: give left_mask= and right_mask="
+    ):
+        on_object()(*images, pair, masks=(mask, None), surface=COARSE)
+    result = on_object("background=clutter")(*images, pair, masks=(mask, None), surface=COARSE)
+    check_outline(result, images)
+
+
+def test_nothing_is_looked_for_where_the_whole_view_is_taken():
+    pair = toed_in_pair()
+    images = [photograph(camera) for camera in pair.cameras]
+    with pytest.raises(UserError, match=r"find, center, size: .* have no effect"):
+        reconstructor("rig=paper")(*images, pair, find="mug", surface=COARSE)
 
 
 def test_what_is_detected_on_the_left_is_found_on_the_right(monkeypatch):
@@ -256,6 +299,8 @@ def test_another_arrangement_than_the_papers_is_refused(pair, complaint):
             {"boxes": ([10, 10, 20, 20], None)},
             "right: nothing in it looks like .* left image; .* give right_box=",
         ),
+        ({"boxes": ([300, 100, 300.4, 100.4], None)}, "right: nothing in it looks like"),
+        ({"boxes": ([10, 100, 600, 102.5], None)}, "right: nothing in it looks like"),
         ({"boxes": ([10, 10, 5, 20],) * 2}, "left_box=.*must have left < right"),
         ({"boxes": ([10, 10, 700, 20],) * 2}, "left_box=.*reaches out of the image of 640 x 360 pixels"),
         ({"boxes": ([10, 10, 20],) * 2}, "must be \\[left,top,right,bottom\\]"),
