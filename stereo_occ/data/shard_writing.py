@@ -23,6 +23,9 @@ from stereo_occ.writing import partial_path
 
 POINTS_PER_CHUNK = 8192
 
+#: Version of HDF5's own form, whatever newer ones the library may know.
+HDF5 = ("v200", "v200")
+
 
 def write_shard(path: Path, shape: Shape, views: Views, pools: Mapping[str, PointPool]) -> None:
     """Write a shard so that ``path`` is either absent or complete, whatever interrupts the writing.
@@ -60,7 +63,7 @@ def _write_to_disk(path: Path, content: bytes | memoryview) -> None:
 def _file_image(shape: Shape, views: Views, pools: Mapping[str, PointPool]) -> memoryview:
     """The bytes of the file, made in memory: where a disk is full, HDF5 crashes instead of raising."""
     image = BytesIO()
-    with h5py.File(image, "w", libver="latest", track_order=False) as file:
+    with h5py.File(image, "w", libver=HDF5, track_order=False) as file:
         file.attrs["version"] = VERSION
         for name, text in (
             ("format", FORMAT),

@@ -117,16 +117,19 @@ def test_the_twin_of_one_view_has_the_same_parameters_and_ignores_the_right_view
     assert {n: p.shape for n, p in twin.named_parameters()} == {
         n: p.shape for n, p in pair.named_parameters()
     }
-    views, other, points = random_pairs(3), random_pairs(3, seed=1), some_points(3)
-    unlike = replace(
-        views,
-        right_BCHW=other.right_BCHW,
-        K_B233=torch.stack([views.K_B233[:, 0], other.K_B233[:, 1]], dim=1),
-        camera_from_rig_B244=torch.stack(
-            [views.camera_from_rig_B244[:, 0], other.camera_from_rig_B244[:, 1]], dim=1
-        ),
+    views, points = random_pairs(3), some_points(3)
+    alike, unlike = (
+        replace(
+            views,
+            right_BCHW=other.right_BCHW,
+            K_B233=torch.stack([views.K_B233[:, 0], other.K_B233[:, 1]], dim=1),
+            camera_from_rig_B244=torch.stack(
+                [views.camera_from_rig_B244[:, 0], other.camera_from_rig_B244[:, 1]], dim=1
+            ),
+        )
+        for other in (views, random_pairs(3, seed=1))
     )
-    assert torch.equal(twin(views, points), twin(unlike, points))
+    assert torch.equal(twin(alike, points), twin(unlike, points))
     assert (pair(views, points) - pair(unlike, points)).abs().max() > 1e-3
 
 
