@@ -6,6 +6,7 @@ from itertools import chain, pairwise
 import numpy as np
 import pytest
 import torch
+import trimesh
 from samples import POOL, SIDE, small_shard
 from scipy.spatial import cKDTree
 
