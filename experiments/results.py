@@ -201,7 +201,7 @@ def main() -> None:
     (HERE / "results.json").write_text(json.dumps(summary(), indent=1) + "\n")
     curves()
     recipe_curves()
-    examples(RECIPE / "plane_sweep_stereo")
+    examples(LONGER / "plane_sweep_stereo_aided")
     for page, lines in ((README, table()), (METRICS_PAGE, floors()), (EXPERIMENTS_PAGE, probes())):
         text = page.read_text()
         before, after = text.split(BEGIN)[0], text.split(END)[1]
