@@ -44,5 +44,6 @@ def load_pretrained(network: nn.Module, weights: WeightsEnum, key: str, remedy: 
             raise UserError(f"{key}: {cached} does not hold {weights.name}; delete it, or {remedy}") from error
         reason = str(error).partition("\n")[0]
         raise UserError(
-            f"{key}: {weights.name} is not at {cached} and cannot be fetched ({reason}); put the file there, or {remedy}"
+            f"{key}: {weights.name} is not at {cached} and cannot be fetched ({reason}); put the file there, or "
+            f"{remedy}"
         ) from error
