@@ -41,7 +41,9 @@ def load_pretrained(network: nn.Module, weights: WeightsEnum, key: str, remedy: 
         network.load_state_dict(dict(state))
     except (OSError, RuntimeError, EOFError, UnpicklingError, AttributeError, TypeError, ValueError) as error:
         if cached.is_file():
-            raise UserError(f"{key}: {cached} does not hold {weights.name}; delete it, or {remedy}") from error
+            raise UserError(
+                f"{key}: {cached} does not hold {weights.name}; delete it, or {remedy}"
+            ) from error
         reason = str(error).partition("\n")[0]
         raise UserError(
             f"{key}: {weights.name} is not at {cached} and cannot be fetched ({reason}); put the file there, or "
