@@ -51,17 +51,17 @@ def locate_pair(
     in_left, in_right = (_given(*part) for part in zip(photos, boxes, masks, SIDES, strict=True))
     if in_left is not None and in_right is not None:
         return in_left, in_right
-    if in_left is not None and required:
+    if not required:
+        return None
+    if in_left is not None:
         return in_left, matched(pair, photos, in_left, 0)
-    if in_right is not None and required:
+    if in_right is not None:
         return matched(pair, photos, in_right, 1), in_right
-    if find is not None and required:
+    if find is not None:
         from stereo_occ.photographs.detect import detected  # all of torchvision's detectors, for this alone
 
         in_left = detected(photos[0], find, SIDES[0])
         return in_left, matched(pair, photos, in_left, 0)
-    if not required:
-        return None
     left, right = (
         on_plain_background(photo.rgb_HW3, side) for photo, side in zip(photos, SIDES, strict=True)
     )

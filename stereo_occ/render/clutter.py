@@ -53,9 +53,7 @@ class ClutterConfig:
     period: list[float] = MISSING  # of a pattern, log-uniform
     roughness: list[float] = MISSING  # 0 to 1
     occlusion: float = MISSING  # share of the object's width that a nearer thing may hide
-    photographs: float | None = (
-        None  # share of tables and walls that show a photograph, one of scikit-image's
-    )
+    photographs: float | None = None  # share of tables and walls that show one of scikit-image's
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,7 +245,7 @@ def _surface(config: ClutterConfig, rng: np.random.Generator) -> tuple[Solid, ND
     if rng.random() >= share(config.photographs or 0, "background.clutter.photographs"):
         return plane(), None
     name = PHOTOGRAPHS[int(rng.integers(len(PHOTOGRAPHS)))]
-    side = float(np.exp(rng.uniform(*np.log(PICTURED))))
+    side = draw_log(PICTURED, "PICTURED", rng)
     return pictured_plane(photograph(name), side / EXTENT)
 
 
