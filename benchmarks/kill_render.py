@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks.processes import finish
 from stereo_occ.provenance import environment
 
 
@@ -27,13 +28,6 @@ def start(folder: Path, overrides: list[str], workers: int) -> "subprocess.Popen
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
-
-
-def finish(process: "subprocess.Popen[bytes]") -> None:
-    """Wait; stop if it failed."""
-    error = process.communicate()[1].decode()
-    if process.returncode:
-        sys.exit(error)
 
 
 def files(folder: Path) -> dict[str, bytes]:

@@ -20,6 +20,7 @@ from typing import Any
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from benchmarks.processes import finish
 from stereo_occ.provenance import environment
 
 # A resumed run purges what the killed part had logged, and says so.
@@ -48,13 +49,6 @@ def start(folder: Path, data: Path, steps: int) -> "subprocess.Popen[bytes]":
         f"hydra.run.dir={folder}",
     ]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-
-
-def finish(process: "subprocess.Popen[bytes]") -> None:
-    """Wait; stop if it failed."""
-    error = process.communicate()[1].decode()
-    if process.returncode:
-        sys.exit(error)
 
 
 def left_behind(folder: Path) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from stereo_occ.geometry.camera import StereoRig
 from stereo_occ.geometry.pose import Pose
 from stereo_occ.ranges import bounds, draw, draw_log, share
 from stereo_occ.render.finish import Finish, Pattern
-from stereo_occ.render.pictured import PHOTOGRAPHS, photograph, pictured_plane
+from stereo_occ.render.pictured import draw_pictured
 from stereo_occ.render.primitives import Solid, ball, box, cylinder, plane
 
 #: Things on the table; the shader's 16, less the object, the table and the wall.
@@ -26,9 +26,6 @@ SHADES = 5
 
 #: Sides of the table and the wall, diagonals of the object.
 EXTENT = 150.0
-
-#: Side of a photograph on the table or the wall, diagonals of the object, log-uniform.
-PICTURED = (8.0, 20.0)
 
 #: Places tried for each thing.
 CANDIDATES = 12
@@ -98,7 +95,11 @@ def draw_clutter(
     if up_3 is None:
         up_3 = np.array([0.0, np.cos(elevation), np.sin(elevation)])
     level = _Level(pose.to_rig(hull_N3), pose.scale, rig, up_3)
-    surfaces = [_surface(config, spare) for spare in rng.spawn(2)]
+    pictured = share(config.photographs or 0, "background.clutter.photographs")
+    surfaces = [
+        draw_pictured(EXTENT, spare) if spare.random() < pictured else (plane(), None)
+        for spare in rng.spawn(2)
+    ]
     (table, _), (wall, _) = surfaces
     wall = _wall(config, wall, pose.scale, rng)
     placed = _on_table(config, level, count, rng)
@@ -238,15 +239,6 @@ def _visible(
         outside_C = far_C > 1.2 * radius + 0.1 * level.diagonal
         visible_C &= outside_C & (behind_C | (apart_C > sum_C - 2 * occlusion * width))
     return visible_C
-
-
-def _surface(config: ClutterConfig, rng: np.random.Generator) -> tuple[Solid, NDArray[np.float64] | None]:
-    """A plane, with the colours of its vertices if it shows a photograph."""
-    if rng.random() >= share(config.photographs or 0, "background.clutter.photographs"):
-        return plane(), None
-    name = PHOTOGRAPHS[int(rng.integers(len(PHOTOGRAPHS)))]
-    side = draw_log(PICTURED, "PICTURED", rng)
-    return pictured_plane(photograph(name), side / EXTENT)
 
 
 def _wall(config: ClutterConfig, surface: Solid, diagonal: float, rng: np.random.Generator) -> Solid:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from skimage import data
 
+from stereo_occ.ranges import draw_log
 from stereo_occ.render.finish import root_of_linear
 from stereo_occ.render.primitives import Solid, grid
 
@@ -14,8 +15,21 @@ PHOTOGRAPHS = (
     "astronaut", "brick", "camera", "cat", "coffee", "coins", "grass", "gravel", "page", "rocket", "text",
 )  # fmt: skip
 
+#: Side of a photograph on the table or the wall, diagonals of the object, log-uniform.
+SIDES = (8.0, 20.0)
+
 #: Vertices along each side of a photograph.
 SIDE = 320
+
+
+def draw_pictured(extent: float, rng: np.random.Generator) -> tuple[Solid, NDArray[np.float64]]:
+    """A :func:`pictured_plane` with one of them.
+
+    Args:
+        extent: side of the plane, diagonals of the object.
+    """
+    name = PHOTOGRAPHS[int(rng.integers(len(PHOTOGRAPHS)))]
+    return pictured_plane(photograph(name), draw_log(SIDES, "SIDES", rng) / extent)
 
 
 @cache

@@ -67,7 +67,9 @@ def test_a_sweep_of_both_models(site, tmp_path):
         http_proxy="http://127.0.0.1:9", https_proxy="http://127.0.0.1:9", **cache,
     )  # fmt: skip
     assert done.returncode == 2
-    (line,) = [line for line in done.stderr.splitlines() if line.startswith("stereo_occ:")]
+    lines = [line for line in done.stderr.splitlines() if line.startswith("stereo_occ:")]
+    assert len(lines) == 1, done.stderr
+    (line,) = lines
     assert line.startswith("stereo_occ: model.encoder.weights: IMAGENET1K_V1 is not at")
     assert line.endswith("or train from scratch with model.encoder.weights=null")
     assert "Traceback" not in done.stderr
