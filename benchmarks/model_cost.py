@@ -1,13 +1,16 @@
 """Parameters and multiply-accumulates of every shipped model, as a Markdown table.
 
-    python benchmarks/model_cost.py
+    python -m benchmarks.model_cost
 
 Multiply-accumulates (MMAC, millions) are those of one sample's forward pass, counted by torch from the operators that
 run: the encoder's share is ``encode``, the decoder's is ``decode`` of the stated query points. Convolution taps that
 can only meet padding do not run and are not counted (DilatedConv).
 """
 
+import argparse
+import json
 from dataclasses import dataclass
+from pathlib import Path
 
 import torch
 from hydra import compose, initialize_config_dir
@@ -32,6 +35,7 @@ MODELS = {
         "model.encoder.weights=null",
     ],
     "pixel_stereo": ["model=pixel_stereo"],
+    "plane_sweep_mono": ["model=plane_sweep_mono"],
     "plane_sweep_stereo": ["model=plane_sweep_stereo"],
     "plane_sweep_stereo, stride 2": ["model=plane_sweep_stereo", "model.feature_stride=2"],
     "plane_sweep_stereo, around the object": ["model=plane_sweep_stereo", "model.around=object"],
@@ -81,29 +85,35 @@ def mmac(model: OccupancyModel, rig: StereoRig, points: int) -> tuple[float, flo
     return encoding.get_total_flops() / 2e6, decoding.get_total_flops() / 2e6
 
 
-def row(name: str, size: Size, cfg: DictConfig) -> str:
-    """One line of the table."""
+def costs(size: Size, cfg: DictConfig) -> dict[str, float]:
+    """Parameters and multiply-accumulates of a model."""
     rig = build_rig(OmegaConf.to_object(cfg.rig), size.image_side)
     model = build_model(plain(cfg.model), rig)
     encode, decode = mmac(model, rig, size.points)
-    parameters = sum(p.numel() for p in model.parameters()) / 1e6
-    cells = getattr(getattr(model, "cost_volume", None), "disparities", None)
-    span = f"{cells[0]} .. {cells[-1]}" if cells else ""
-    return (
-        f"| {name} | {size.image_side} | {span} | {size.hidden} | {size.points:,} "
-        f"| {parameters:.2f} | {encode:,.0f} | {decode:,.0f} |"
-    )
+    parameters = sum(p.numel() for p in model.parameters())
+    return {"parameters": parameters, "encode_mmac": encode, "decode_mmac": decode}
 
 
 def main() -> None:
     """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--output", type=Path, help="JSON file for the rows of the smallest size")
+    options = parser.parse_args()
     register_schemas()
-    print("| model | side | cells | hidden | points | parameters, M | encode, MMAC | decode, MMAC |")
-    print("|---|---|---|---|---|---|---|---|")
+    smallest = {}
+    print("| model | side | hidden | points | parameters, M | encode, MMAC | decode, MMAC |")
+    print("|---|---|---|---|---|---|---|")
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):
         for name, overrides in MODELS.items():
             for size in SIZES:
-                print(row(name, size, compose("train", [*overrides, *size.overrides()])))
+                cost = costs(size, compose("train", [*overrides, *size.overrides()]))
+                smallest.setdefault(name, cost)
+                print(
+                    f"| {name} | {size.image_side} | {size.hidden} | {size.points:,} | {cost['parameters'] / 1e6:.2f} "
+                    f"| {cost['encode_mmac']:,.0f} | {cost['decode_mmac']:,.0f} |"
+                )
+    if options.output:
+        options.output.write_text(json.dumps(smallest, indent=1) + "\n")
 
 
 if __name__ == "__main__":

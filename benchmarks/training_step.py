@@ -44,6 +44,8 @@ MODELS = {
     "mono": ["model=mono", "model.encoder.weights=null"],
     "pixel_stereo": ["model=pixel_stereo"],
     "plane_sweep_stereo": ["model=plane_sweep_stereo"],
+    "stereo_signed": ["model=stereo_signed"],
+    "plane_sweep_mono": ["model=plane_sweep_mono"],
 }
 WAYS = ("reference", "fp32", "bf16")
 WARM_UP = 4  # steps

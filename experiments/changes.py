@@ -1,6 +1,6 @@
-"""What probes change and how they learn, from their run folders: ``collect.py BASE PROBE...`` writes ``probes.csv``.
+"""What changes of single settings do to training: ``changes.py TABLE.csv BASE RUN...``, all run folders.
 
-A row per validation: the settings in which the probe's ``config.yaml`` differs from the base's, step, IoU, seconds per
+A row per validation: the settings in which the run's ``config.yaml`` differs from the base's, step, IoU, seconds per
 step. The seconds are of a machine that did other things too; they order costs, no more.
 """
 
@@ -13,15 +13,23 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from stereo_occ.flat import flat
 
-HERE = Path(__file__).parent
-NOT_PROBED = ("data", "steps", "validation", "logger", "paths", "trainer", "scale.steps", "experiment")
+NOT_CHANGES = (
+    "data",
+    "steps",
+    "validation",
+    "logger",
+    "paths",
+    "trainer.threads",
+    "scale.steps",
+    "experiment",
+)
 SCALARS = ("val/iou", "val/iou/mug", "val/iou/bowl", "val/iou/bottle")
 
 
-def changes(base: Path, probe: Path) -> str:
-    """The probe's settings that are not the base's."""
-    old, new = (flat(yaml.safe_load((run / "config.yaml").read_text())) for run in (base, probe))
-    changed = {k: v for k, v in new.items() if old.get(k) != v and not k.startswith(NOT_PROBED)}
+def changes(base: Path, run: Path) -> str:
+    """The run's settings that are not the base's."""
+    old, new = (flat(yaml.safe_load((folder / "config.yaml").read_text())) for folder in (base, run))
+    changed = {k: v for k, v in new.items() if old.get(k) != v and not k.startswith(NOT_CHANGES)}
     return " ".join(f"{key}={value}".replace(" ", "") for key, value in changed.items())
 
 
@@ -35,11 +43,11 @@ def curve(run: Path) -> list[list[str]]:
     return [[str(v[0].step), *(f"{x.value:.4f}" for x in v), f"{seconds:.3f}"] for v in values]
 
 
-def main(base: Path, *probes: Path) -> None:
-    with (HERE / "probes.csv").open("w", newline="") as file:
+def main(table: Path, base: Path, *runs: Path) -> None:
+    with table.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["changed", "step", "iou", "mug", "bowl", "bottle", "seconds_per_step"])
-        for run in (base, *probes):
+        for run in (base, *runs):
             writer.writerows([changes(base, run), *row] for row in curve(run))
 
 

@@ -34,8 +34,8 @@ def model_card(
         "",
         "## Training",
         f"{description['step']} steps on {', '.join(categories)} of `data={data['name']}` with "
-        f"`rig={config['rig'].get('kind', 'toed_in')}`, `placement={config['placement']['kind']}`; rendered pictures "
-        f"alone, {data['views']} pairs of each object. The whole configuration is in `{name}.json`.",
+        f"`rig.kind={config['rig'].get('kind', 'toed_in')}`, `placement.kind={config['placement']['kind']}`; "
+        f"rendered pictures alone, {data['views']} pairs of each object. The whole configuration is in `{name}.json`.",
         *(["```", command, "```"] if command else []),
         "",
         "## Metrics",

@@ -19,4 +19,4 @@ probe rate optimizer.lr=3e-3
 probe auxiliary auxiliary=mask_depth
 probe around model.around=object
 cd outputs/probes
-../../.venv/bin/python ../../experiments/probes/collect.py base points wide rate auxiliary around
+../../.venv/bin/python ../../experiments/changes.py ../../experiments/probes/probes.csv base points wide rate auxiliary around

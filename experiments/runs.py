@@ -1,0 +1,44 @@
+"""The committed runs: where their files are and how each was made."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+FLOORS = HERE / "floors"
+SHORT, RECIPE, LONGER, FREE, FIELD = (
+    HERE / name for name in ("laptop_4k", "recipe_10k", "recipe_20k", "free_10k", "field")
+)
+AIDED = "model=plane_sweep_stereo auxiliary=mask_depth"
+#: Settings of each run; those of a family are compared with its :data:`MONO`.
+RUNS = {
+    SHORT / "mono": "model=mono model.encoder.weights=null steps=4000",
+    SHORT / "stereo": "model=stereo steps=4000",
+    RECIPE / "mono_scratch": "experiment=recipe model=mono_scratch steps=10000",
+    RECIPE / "stereo": "experiment=recipe model=stereo steps=10000",
+    RECIPE / "plane_sweep_stereo": "experiment=recipe model=plane_sweep_stereo steps=10000",
+    RECIPE / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=10000",
+    LONGER / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=20000",
+    FREE / "mono_scratch": "experiment=recipe placement=free model=mono_scratch steps=10000",
+    FREE / "plane_sweep_stereo_aided": f"experiment=recipe placement=free {AIDED} steps=10000",
+}
+MONO = "mono_scratch"
+CATEGORIES = ("mug", "bowl", "bottle")
+
+
+def load(path: Path) -> Any:
+    """What a JSON file holds."""
+    return json.loads(path.read_text())
+
+
+def metrics_of(folder: Path, where: str = "test") -> dict[str, float]:
+    """Mean metrics of a run or a baseline on ``test`` or ``real`` objects."""
+    metrics: dict[str, float] = load(folder / f"{where}.json")["metrics"]
+    return metrics
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """The rows of a CSV file."""
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
