@@ -29,3 +29,14 @@ learn() { # name, steps, overrides
 against() { # folder, A, B: what A has over B on test objects; family/name of each
     .venv/bin/python -m stereo_occ.compare "outputs/$2/test_best" "outputs/$3/test_best" --output "$here/$1"
 }
+
+# What one change does to the plane sweep.
+try() { # name, steps, overrides
+    local name=$1 steps=$2; shift 2
+    .venv/bin/python -m stereo_occ.train experiment=recipe scale=laptop model=plane_sweep_stereo steps="$steps" \
+        validation.views=4 validation.points=8192 trainer.threads=1 progress=false hydra.run.dir="$runs/$name" "$@"
+}
+
+tabulate() { # names, first that of the run from which the others differ
+    .venv/bin/python experiments/changes.py "$here/$family.csv" "${@/#/$runs/}"
+}
