@@ -14,6 +14,8 @@ learn plane_sweep_stereo 10000 model=plane_sweep_stereo
 learn plane_sweep_stereo_aided 10000 model=plane_sweep_stereo auxiliary=mask_depth
 against stereo_against_mono $family/plane_sweep_stereo $family/mono_scratch
 against paper_stereo_against_mono $family/stereo $family/mono_scratch
+against signed_against_paper_stereo $family/stereo_signed $family/stereo
+against pixel_stereo_against_paper_stereo $family/pixel_stereo $family/stereo
 against aided_against_mono $family/plane_sweep_stereo_aided $family/mono_scratch
 against aided_against_its_mono $family/plane_sweep_stereo_aided $family/plane_sweep_mono_aided
 against aided_against_unaided $family/plane_sweep_stereo_aided $family/plane_sweep_stereo
