@@ -184,7 +184,9 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
     parser.add_argument("--profile", action="store_true", help="also where a bf16 step's time goes")
-    parser.add_argument("--output", type=Path, help="JSON file for the figures")
+    parser.add_argument(
+        "--output", type=Path, help="JSON file for the figures, which keeps those of other models"
+    )
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
     figures: dict[str, Any] = {"threads": options.threads}
@@ -223,7 +225,9 @@ def main() -> None:
         f"reading: {reading:.1f} ms a batch, {fastest / reading:.0f} times as fast as the fastest model's step"
     )
     if options.output:
-        options.output.write_text(json.dumps(figures, indent=2) + "\n")
+        known = json.loads(options.output.read_text()) if options.output.exists() else {}
+        same = known.get("threads") == options.threads
+        options.output.write_text(json.dumps((known if same else {}) | figures, indent=2) + "\n")
 
 
 if __name__ == "__main__":

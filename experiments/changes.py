@@ -1,7 +1,7 @@
 """What changes of single settings do to training: ``changes.py TABLE.csv BASE RUN...``, all run folders.
 
-A row per validation: the settings in which the run's ``config.yaml`` differs from the base's, step, IoU, seconds per
-step. The seconds are of a machine that did other things too; they order costs, no more.
+A row per validation: what the run was told on its command line and the base was not, step, IoU, seconds per step. The
+seconds are of a machine that did other things too; they order costs, no more.
 """
 
 import csv
@@ -11,26 +11,15 @@ from pathlib import Path
 import yaml
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from stereo_occ.flat import flat
+from stereo_occ.run_folder import OVERRIDES
 
-NOT_CHANGES = (
-    "data",
-    "steps",
-    "validation",
-    "logger",
-    "paths",
-    "trainer.threads",
-    "scale.steps",
-    "experiment",
-)
-SCALARS = ("val/iou", "val/iou/mug", "val/iou/bowl", "val/iou/bottle")
+SCALARS = ("val/iou", "val/iou/mug", "val/iou/bowl", "val/iou/bottle", "val/iou_bbox")
 
 
 def changes(base: Path, run: Path) -> str:
-    """The run's settings that are not the base's."""
-    old, new = (flat(yaml.safe_load((folder / "config.yaml").read_text())) for folder in (base, run))
-    changed = {k: v for k, v in new.items() if old.get(k) != v and not k.startswith(NOT_CHANGES)}
-    return " ".join(f"{key}={value}".replace(" ", "") for key, value in changed.items())
+    """What the run was told that the base was not."""
+    told = [yaml.safe_load((folder / OVERRIDES).read_text()) for folder in (base, run)]
+    return " ".join(override for override in told[1] if override not in told[0])
 
 
 def curve(run: Path) -> list[list[str]]:
@@ -46,7 +35,7 @@ def curve(run: Path) -> list[list[str]]:
 def main(table: Path, base: Path, *runs: Path) -> None:
     with table.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["changed", "step", "iou", "mug", "bowl", "bottle", "seconds_per_step"])
+        writer.writerow(["changed", "step", "iou", "mug", "bowl", "bottle", "iou_bbox", "seconds_per_step"])
         for run in (base, *runs):
             writer.writerows([changes(base, run), *row] for row in curve(run))
 

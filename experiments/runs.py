@@ -19,7 +19,8 @@ RUNS = {
     RECIPE / "stereo": "experiment=recipe model=stereo steps=10000",
     RECIPE / "stereo_signed": "experiment=recipe model=stereo_signed steps=10000",
     RECIPE / "pixel_stereo": "experiment=recipe model=pixel_stereo steps=10000",
-    RECIPE / "plane_sweep_mono_aided": "experiment=recipe model=plane_sweep_mono auxiliary=mask_depth steps=10000",
+    RECIPE
+    / "plane_sweep_mono_aided": "experiment=recipe model=plane_sweep_mono auxiliary=mask_depth steps=10000",
     RECIPE / "plane_sweep_stereo": "experiment=recipe model=plane_sweep_stereo steps=10000",
     RECIPE / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=10000",
     LONGER / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=20000",

@@ -159,8 +159,12 @@ def ablation() -> str:
         iou = float(best["iou"])
         base = iou if base is None else base
         against = f"{iou - base:+.3f}" if changed else ""
-        rows.append([_changed(changed), f"{iou:.3f}", against, _parts(best)])
-    return _markdown(("changed", "`iou`", "against nothing changed", "mug / bowl / bottle"), rows)
+        rows.append(
+            [_changed(changed), f"{iou:.3f}", against, _parts(best), f"{float(best['iou_bbox']):.3f}"]
+        )
+    return _markdown(
+        ("changed", "`iou`", "against nothing changed", "mug / bowl / bottle", "`iou_bbox`"), rows
+    )
 
 
 def precision() -> str:
