@@ -30,11 +30,12 @@ against() { # folder, A, B: what A has over B on test objects; family/name of ea
     .venv/bin/python -m stereo_occ.compare "outputs/$2/test_best" "outputs/$3/test_best" --output "$here/$1"
 }
 
-# What one change does to the plane sweep.
-try() { # name, steps, overrides
-    local name=$1 steps=$2; shift 2
+# What one change does to the plane sweep, on a schedule of `steps` that is validated every `interval`; set both first.
+try() { # name, overrides
+    local name=$1; shift
     .venv/bin/python -m stereo_occ.train experiment=recipe scale=laptop model=plane_sweep_stereo steps="$steps" \
-        validation.views=4 validation.points=8192 trainer.threads=1 progress=false hydra.run.dir="$runs/$name" "$@"
+        validation.interval="$interval" validation.views=4 validation.points=8192 trainer.threads=1 progress=false \
+        hydra.run.dir="$runs/$name" "$@"
 }
 
 tabulate() { # names, first that of the run from which the others differ

@@ -62,7 +62,7 @@ def models() -> str:
                 f"{size['parameters'] / 1e6:.1f} M",
                 f"{size['encode_mmac'] + size['decode_mmac']:.0f}",
                 f"{ms:.0f}",
-                f"{ms * FULL / 60_000:.0f}",
+                _minutes(ms),
                 *(_by_category(metrics_of(folder, where)) for where in ("test", "real")),
             ]
         )
@@ -119,7 +119,7 @@ def speed() -> str:
                 f"`{name}`",
                 *(f"{ms:.0f} ms" for ms in (reference, fp32, bf16)),
                 f"{reference / bf16:.1f}",
-                f"{bf16 * FULL / 60_000:.0f} min",
+                f"{_minutes(bf16)} min",
                 f"{values['floor_ms']:.0f} ms",
             ]
         )
@@ -194,6 +194,11 @@ def _curves(path: Path) -> dict[str, dict[int, dict[str, str]]]:
 
 def _interval(value: Sequence[float] | None) -> str:
     return "" if value is None else f"{value[0]:+.3f} [{value[1]:.3f}, {value[2]:.3f}]"
+
+
+def _minutes(ms_per_step: float) -> str:
+    """Of the paper's schedule."""
+    return f"{ms_per_step * FULL / 60_000:.0f}"
 
 
 def _changed(changed: str) -> str:
