@@ -6,7 +6,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
-from runs import CATEGORIES, FLOORS, RECIPE, RUNS, SHORT, load, metrics_of
+from runs import CATEGORIES, FLOORS, RECIPE, SHORT, load, metrics_of, runs_of
 
 METRICS = {"iou": "-", "iou_bbox": "--", "iou_unrotated": ":"}
 
@@ -32,7 +32,7 @@ def recipe_curves() -> None:
     """Each metric along the training of each model of the recipe, on validation objects, beside two floors."""
     figure, axes = plt.subplots(1, len(METRICS), figsize=(11, 3.4), layout="constrained")
     for axis, metric in zip(axes, METRICS, strict=True):
-        for folder in (folder for folder in RUNS if folder.parent == RECIPE):
+        for folder in runs_of(RECIPE):
             history = load(folder / "training.json")["history"]
             steps = [entry["step"] for entry in history]
             axis.plot(steps, [entry[f"val/{metric}"] for entry in history], label=folder.name)

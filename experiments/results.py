@@ -21,7 +21,7 @@ PROJECT = HERE.parent
 PAGES = {
     "README.md": [tables.trained],
     "docs/metrics.md": [tables.floors],
-    "docs/models.md": [tables.models, tables.speed],
+    "docs/models.md": [tables.cost, tables.models, tables.speed],
     "experiments/recipe_10k/README.md": [tables.over_mono, tables.parts],
     "docs/experiments.md": [tables.probes, tables.ablation, tables.precision],
 }

@@ -10,7 +10,8 @@ FLOORS = HERE / "floors"
 SHORT, RECIPE, LONGER, FREE, FIELD = (
     HERE / name for name in ("laptop_4k", "recipe_10k", "recipe_20k", "free_10k", "field")
 )
-AIDED = "model=plane_sweep_stereo auxiliary=mask_depth"
+AID = "auxiliary=mask_depth"
+AIDED = f"model=plane_sweep_stereo {AID}"
 #: Settings of each run; those of a family are compared with its :data:`MONO`.
 RUNS = {
     SHORT / "mono": "model=mono model.encoder.weights=null steps=4000",
@@ -19,8 +20,7 @@ RUNS = {
     RECIPE / "stereo": "experiment=recipe model=stereo steps=10000",
     RECIPE / "stereo_signed": "experiment=recipe model=stereo_signed steps=10000",
     RECIPE / "pixel_stereo": "experiment=recipe model=pixel_stereo steps=10000",
-    RECIPE
-    / "plane_sweep_mono_aided": "experiment=recipe model=plane_sweep_mono auxiliary=mask_depth steps=10000",
+    RECIPE / "plane_sweep_mono_aided": f"experiment=recipe model=plane_sweep_mono {AID} steps=10000",
     RECIPE / "plane_sweep_stereo": "experiment=recipe model=plane_sweep_stereo steps=10000",
     RECIPE / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=10000",
     LONGER / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=20000",
@@ -29,6 +29,11 @@ RUNS = {
 }
 MONO = "mono_scratch"
 CATEGORIES = ("mug", "bowl", "bottle")
+
+
+def runs_of(family: Path) -> list[Path]:
+    """Folders of the runs of a family."""
+    return [folder for folder in RUNS if folder.parent == family]
 
 
 def load(path: Path) -> Any:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from runs import CATEGORIES, FLOORS, HERE, MONO, RECIPE, RUNS, SHORT, load, metrics_of, rows_of
+from runs import CATEGORIES, FLOORS, HERE, MONO, RECIPE, RUNS, SHORT, load, metrics_of, rows_of, runs_of
 
 BASELINES = ("visual_hull", "sgm", "mean_shape", "nearest_shape", "truth")
 PROBED = (300, 600, 900, 1200, 2100, 3000)  # steps
@@ -44,6 +44,19 @@ def trained() -> str:
     return _markdown(head, rows)
 
 
+def cost() -> str:
+    """Size and operations of every model."""
+    rows = [
+        [
+            name,
+            f"{size['parameters'] / 1e6:.2f}",
+            *(f"{size[f'{part}_mmac']:.0f}" for part in ("encode", "decode")),
+        ]
+        for name, size in load(HERE / "speed" / "model_cost.json").items()
+    ]
+    return _markdown(("model", "parameters, M", "encode, MMAC", "decode, MMAC"), rows)
+
+
 def models() -> str:
     """What each model of the recipe costs and reaches."""
     head = (
@@ -52,7 +65,7 @@ def models() -> str:
     )  # fmt: skip
     cost, speed = (load(HERE / "speed" / f"{name}.json") for name in ("model_cost", "training_step"))
     rows = []
-    for folder in (folder for folder in RUNS if folder.parent == RECIPE):
+    for folder in runs_of(RECIPE):
         of_cost, of_speed = COSTS[folder.name]
         size = cost[of_cost]
         ms = speed[of_speed]["bf16_ms"]
@@ -73,7 +86,7 @@ def over_mono() -> str:
     """What each run of the recipe has over mono on test objects, with intervals."""
     results = load(HERE / "results.json")
     rows = []
-    for folder in (folder for folder in RUNS if folder.parent == RECIPE and folder.name != MONO):
+    for folder in (folder for folder in runs_of(RECIPE) if folder.name != MONO):
         differences = results[f"{RECIPE.name}/{folder.name}"]["test"]["over mono_scratch"]
         for metric in ("iou", "iou_unrotated", "handle_recall"):
             found = differences[metric]
@@ -153,15 +166,15 @@ def probes() -> str:
 
 def ablation() -> str:
     """What each training aid is worth at the end of a short schedule."""
-    rows, base = [], None
-    for changed, by_step in _curves(HERE / "ablation" / "ablation.csv").items():
-        best = max(by_step.values(), key=lambda row: float(row["iou"]))
-        iou = float(best["iou"])
-        base = iou if base is None else base
-        against = f"{iou - base:+.3f}" if changed else ""
-        rows.append(
-            [_changed(changed), f"{iou:.3f}", against, _parts(best), f"{float(best['iou_bbox']):.3f}"]
-        )
+    best = {
+        changed: max(by_step.values(), key=lambda row: float(row["iou"]))
+        for changed, by_step in _curves(HERE / "ablation" / "ablation.csv").items()
+    }
+    rows = []
+    for changed, row in best.items():
+        iou = float(row["iou"])
+        against = f"{iou - float(best['']['iou']):+.3f}" if changed else ""
+        rows.append([_changed(changed), f"{iou:.3f}", against, _parts(row), f"{float(row['iou_bbox']):.3f}"])
     return _markdown(
         ("changed", "`iou`", "against nothing changed", "mug / bowl / bottle", "`iou_bbox`"), rows
     )
