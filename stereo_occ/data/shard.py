@@ -138,10 +138,11 @@ class Shard:
         self.close()
 
     def close(self) -> None:
-        """Close the file; the next access opens it again."""
+        """Close the file; the next access opens it again.
+
+        h5py closes what nobody refers to. Its own ``close`` looks through all that is open: 30 ms with 700 shards.
+        """
         forget(self)
-        if "_file" in vars(self):
-            self._file.close()
         self.__dict__ = self.__getstate__()
 
     def __getstate__(self) -> dict[str, Any]:
