@@ -37,6 +37,7 @@ MODELS = {
     "pixel_stereo": ["model=pixel_stereo"],
     "plane_sweep_mono": ["model=plane_sweep_mono"],
     "plane_sweep_stereo": ["model=plane_sweep_stereo"],
+    "plane_sweep_guided": ["model=plane_sweep_guided"],
     "plane_sweep_stereo, stride 2": ["model=plane_sweep_stereo", "model.feature_stride=2"],
     "plane_sweep_stereo, around the object": ["model=plane_sweep_stereo", "model.around=object"],
 }

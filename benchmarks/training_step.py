@@ -46,6 +46,7 @@ MODELS = {
     "plane_sweep_stereo": ["model=plane_sweep_stereo"],
     "stereo_signed": ["model=stereo_signed"],
     "plane_sweep_mono": ["model=plane_sweep_mono"],
+    "plane_sweep_guided": ["model=plane_sweep_guided"],
 }
 WAYS = ("reference", "fp32", "bf16")
 WARM_UP = 4  # steps

@@ -19,6 +19,7 @@ class AuxiliaryConfig:
 
     mask: float = 0.0  # binary cross entropy of the share of each cell that the object covers
     depth: float = 0.0  # mean error of the depth inside the mask, per metre
+    surface: float = 0.0  # the same of the surface that the model itself finds, if it looks for it
 
 
 class AuxiliaryHeads(nn.Module):
@@ -39,11 +40,14 @@ class AuxiliaryHeads(nn.Module):
         return mask_MHW, depth_MHW
 
 
-def auxiliary_losses(heads: AuxiliaryHeads, features_MCHW: Tensor, batch: Batch) -> dict[str, Tensor]:
+def auxiliary_losses(
+    heads: AuxiliaryHeads, features_MCHW: Tensor, batch: Batch, seen_VBHW: Tensor | None = None
+) -> dict[str, Tensor]:
     """Losses ``mask`` and ``depth`` of the maps of the left images, or of the left and then the right ones.
 
     Args:
         batch: with its images' truth, whose means over each cell are learnt.
+        seen_VBHW: depths that the model itself finds, of the same cells; their loss is ``surface``.
     """
     assert batch.truth is not None
     views = len(features_MCHW) // len(batch)
@@ -52,16 +56,20 @@ def auxiliary_losses(heads: AuxiliaryHeads, features_MCHW: Tensor, batch: Batch)
     def cells(images_B2HW: Tensor) -> Tensor:
         return adaptive_avg_pool2d(images_B2HW[:, :views].transpose(0, 1).flatten(0, 1), (height, width))
 
-    mask_MHW, depth_MHW = heads(features_MCHW)
     true_B2HW = batch.truth.depth_B2HW
     seen_MHW = cells((true_B2HW > 0).float())
     offsets_B211 = batch.views.camera_from_rig_B244[:, :, 2, 3, None, None]
     sums_MHW = cells(torch.where(true_B2HW > 0, true_B2HW - offsets_B211, 0))  # of the seen part of each cell
-    errors_MHW = (seen_MHW * depth_MHW - sums_MHW).abs()
-    return {
+
+    def depth_loss(depth_MHW: Tensor) -> Tensor:
+        return (seen_MHW * depth_MHW - sums_MHW).abs().sum() / seen_MHW.sum().clamp(min=1e-6)
+
+    mask_MHW, depth_MHW = heads(features_MCHW)
+    losses = {
         "mask": binary_cross_entropy_with_logits(mask_MHW, cells(batch.truth.mask_B2HW)),
-        "depth": errors_MHW.sum() / seen_MHW.sum().clamp(min=1e-6),
+        "depth": depth_loss(depth_MHW),
     }
+    return losses if seen_VBHW is None else losses | {"surface": depth_loss(seen_VBHW.flatten(0, 1))}
 
 
 @contextmanager

@@ -221,7 +221,7 @@ def _aids(cfg: DictConfig) -> Iterator[str]:
             f"augmentation.roll_deg={augmentation.roll_deg}: model={cfg.model.name} does not read the cameras that "
             f"roll; say augmentation.roll_deg=0"
         )
-    yield from _at_least(0, cfg, "auxiliary.mask", "auxiliary.depth")
+    yield from _at_least(0, cfg, "auxiliary.mask", "auxiliary.depth", "auxiliary.surface")
     decay = cfg.averaging.decay
     if decay is not None and not 0 <= decay < 1:
         yield f"averaging.decay={decay}: must be at least 0 and below 1, or null"

@@ -60,17 +60,16 @@ class Decoder(nn.Module):
         code = with_tensors(self.template, iter(tensors))
         if isinstance(
             self.model, PixelStereoModel
-        ):  # whose decode divides the points, by a number that is free here
-            logits_BN: Tensor = self.model.decoder(code.global_BC, self.model.token(code, points_BN3))
-            return logits_BN
+        ):  # decode divides the points, by a number that is free here
+            return self.model.answer(code, points_BN3)
         return self.model.decode(code, points_BN3)
 
 
 def code_tensors(code: Any, name: str = "code") -> Iterator[tuple[str, Tensor]]:
-    """The tensors of a code with their names, in a fixed order."""
+    """The tensors of a code with their names, in a fixed order; where it has None there is none."""
     if isinstance(code, Tensor):
         yield name, code
-    else:
+    elif code is not None:
         assert is_dataclass(code)
         for part in fields(code):
             yield from code_tensors(getattr(code, part.name), part.name)
@@ -80,6 +79,8 @@ def with_tensors(template: Any, tensors: Iterator[Tensor]) -> Any:
     """A code of the same structure with other tensors."""
     if isinstance(template, Tensor):
         return next(tensors)
+    if template is None:
+        return None
     return type(template)(
         **{part.name: with_tensors(getattr(template, part.name), tensors) for part in fields(template)}
     )

@@ -9,7 +9,7 @@ from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from stereo_occ.auxiliary import AuxiliaryHeads, auxiliary_losses, outputs_of
+from stereo_occ.auxiliary import AuxiliaryConfig, AuxiliaryHeads, auxiliary_losses, outputs_of
 from stereo_occ.averaging import WeightAverage
 from stereo_occ.checkpoint import KEY, VERSION
 from stereo_occ.config import TrainConfig
@@ -50,8 +50,7 @@ class OccupancyTask(lightning.LightningModule):
         self.auxiliary = None
 
     def configure_model(self) -> None:
-        weights = self.config.auxiliary
-        if self.auxiliary is None and (weights.mask or weights.depth):
+        if self.auxiliary is None and self.config.auxiliary != AuxiliaryConfig():
             self.auxiliary = AuxiliaryHeads(self._encoder.channels)
 
     @property
@@ -72,7 +71,8 @@ class OccupancyTask(lightning.LightningModule):
         loss = loss + self.model.guidance(code, queries.points_BN3, queries.occupied_BN)
         self.log("train/loss", loss, prog_bar=True, batch_size=len(batch))
         if self.auxiliary is not None:
-            for name, value in auxiliary_losses(self.auxiliary, features[0], batch).items():
+            losses = auxiliary_losses(self.auxiliary, features[0], batch, self.model.seen_depths(code))
+            for name, value in losses.items():
                 self.log(f"train/{name}_loss", value, batch_size=len(batch))
                 loss = loss + getattr(self.config.auxiliary, name) * value
         return loss

@@ -46,6 +46,13 @@ class OccupancyModel(nn.Module):
         """What training adds to the loss of the logits: how wrong the code is about the points, a scalar."""
         return points_BN3.new_zeros(())
 
+    def seen_depths(self, code: Any) -> Tensor | None:
+        """Depth of what each view sees, along its optical axis less the rig's origin's, metres, ``(V, B, H, W)``.
+
+        None of a model that does not look for it.
+        """
+        return None
+
     def decode_all(self, code: Any, points_BN3: Tensor) -> Tensor:
         """:meth:`decode` in pieces whose activations stay in the processor's cache; for eval mode."""
         piece = max(1, POINTS_IN_CACHE // len(points_BN3))

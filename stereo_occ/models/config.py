@@ -165,6 +165,7 @@ class PlaneSweepStereoConfig(PixelStereoConfig):
     grid: int = MISSING  # cells per side of the volume
     around: str = "cube"  # or object: a coarse volume finds the object, and the grid lies around it
     widths: list[int] = MISSING  # channels of the U-Net's levels, the finest first
+    surface_channels: int | None = None  # that tell points how far behind the seen surface they are
 
 
 SCHEMAS: dict[str, tuple[type, ...]] = {

@@ -10,7 +10,7 @@ from stereo_occ.models.base import OccupancyModel, StereoViews
 from stereo_occ.models.encoders import ImageEncoder
 from stereo_occ.models.evidence import GlobalCode, PairEvidence, positional_encoding
 from stereo_occ.models.point_decoder import PointDecoder
-from stereo_occ.models.sampling import Projections, project_points, ray_maps
+from stereo_occ.models.sampling import Projections, cell_rays, project_points, ray_maps
 
 VIEWS = {"both": 2, "left": 1}  # how many are encoded
 PIXEL_CHANNELS = 8  # of the evidence read from the images themselves
@@ -37,11 +37,16 @@ class CalibratedMaps:
         height, width = self.images_VB3HW.shape[-2:]
         return project_points(points_BN3, self.K_VB33, self.camera_from_rig_VB44, width, height)
 
-    def rays(self) -> Tensor:
-        """Lines of sight ``(V, B, 6, H, W)`` of the maps' cells."""
+    def cell_rays(self) -> tuple[Tensor, Tensor]:
+        """:func:`~stereo_occ.models.sampling.cell_rays` of the maps' cells."""
         height, width = self.features_VBCHW.shape[-2:]
         stride = self.images_VB3HW.shape[-1] // width
-        return ray_maps(self.K_VB33, self.camera_from_rig_VB44, height, width, stride)
+        return cell_rays(self.K_VB33, self.camera_from_rig_VB44, height, width, stride)
+
+    def rays(self) -> Tensor:
+        """Lines of sight ``(V, B, 6, H, W)`` of the maps' cells."""
+        rays_VB6P = ray_maps(*self.cell_rays())
+        return rays_VB6P.view(*rays_VB6P.shape[:3], *self.features_VBCHW.shape[-2:])
 
 
 @dataclass(frozen=True)
@@ -113,16 +118,17 @@ class PixelStereoModel(OccupancyModel):
         """Logits ``(B, N)``."""
         at_once = max(1, SAMPLES // len(points_BN3))
         return torch.cat(
-            [
-                self.decoder(code.global_BC, self.token(code, some_BN3))
-                for some_BN3 in torch.split(points_BN3, at_once, dim=1)
-            ],
-            dim=1,
+            [self.answer(code, some_BN3) for some_BN3 in torch.split(points_BN3, at_once, dim=1)], dim=1
         )
 
-    def token(self, code: PixelStereoCode, points_BN3: Tensor) -> Tensor:
-        """Evidence and place ``(B, N, T)`` of each point."""
-        projections = code.maps.project(points_BN3)
+    def answer(self, code: PixelStereoCode, points_BN3: Tensor) -> Tensor:
+        """:meth:`decode` of all points at once."""
+        token_BNT = self.token(code, points_BN3, code.maps.project(points_BN3))
+        logits_BN: Tensor = self.decoder(code.global_BC, token_BNT)
+        return logits_BN
+
+    def token(self, code: PixelStereoCode, points_BN3: Tensor, projections: Projections) -> Tensor:
+        """Evidence and place ``(B, N, T)`` of each point, which the views see at ``projections``."""
         evidence_BEN = self.evidence(code.maps.features_VBCHW, projections)
         pixels_BEN = self.pixels(code.maps.images_VB3HW, projections)
         return torch.cat(

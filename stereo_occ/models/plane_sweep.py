@@ -12,7 +12,8 @@ from stereo_occ.models.encoders import ImageEncoder
 from stereo_occ.models.evidence import PairEvidence
 from stereo_occ.models.grid import Grid, Locator, locator_loss, working_cube
 from stereo_occ.models.pixel_stereo import CalibratedMaps, PixelStereoCode, PixelStereoModel
-from stereo_occ.models.sampling import cell_centers, sample_volume
+from stereo_occ.models.sampling import Projections, cell_centers, sample_volume
+from stereo_occ.models.seen_surface import SeenSurface
 from stereo_occ.models.unet3d import UNet3d
 
 AROUND = ("cube", "object")
@@ -51,10 +52,11 @@ class SweptVolume(nn.Module):
 
 @dataclass(frozen=True)
 class PlaneSweepCode(PixelStereoCode):
-    """With a volume ``(B, C, D, H, W)`` over the cells of a grid, axes z, y, x."""
+    """With a volume ``(B, C, D, H, W)`` over the cells of a grid, axes z, y, x, and the surface found in it, if any."""
 
     grid: Grid
     volume_BCDHW: Tensor
+    surface_VB2HW: Tensor | None
 
 
 class PlaneSweepStereoModel(PixelStereoModel):
@@ -65,6 +67,8 @@ class PlaneSweepStereoModel(PixelStereoModel):
         around: ``cube``: the volume is over the whole working cube; ``object``: over a cube around the object, which
             a volume of half as many cells per side over the working cube finds first.
         widths: channels of each level of the U-Net, the finest first.
+        surface_channels: that tell points how far they are behind the surface that the views see; None: it is not
+            looked for.
         views, groups, frequencies, code_size, hidden, blocks: see :class:`PixelStereoModel`.
 
     Raises:
@@ -78,6 +82,7 @@ class PlaneSweepStereoModel(PixelStereoModel):
         grid: int,
         around: str = "cube",
         widths: Sequence[int],
+        surface_channels: int | None = None,
         views: str,
         groups: int,
         frequencies: int,
@@ -89,7 +94,7 @@ class PlaneSweepStereoModel(PixelStereoModel):
             raise UserError(f"model.around: must be one of {', '.join(AROUND)}, got {around}")
         super().__init__(
             encoder,
-            widths[0] + (3 if around == "object" else 0),
+            widths[0] + (surface_channels or 0) + (3 if around == "object" else 0),
             views=views,
             groups=groups,
             frequencies=frequencies,
@@ -99,6 +104,9 @@ class PlaneSweepStereoModel(PixelStereoModel):
         )
         self.sweep = SweptVolume(encoder.channels, groups, grid, widths[0])
         self.unet = UNet3d(widths)
+        self.surface = (
+            SeenSurface(encoder.channels, widths[0], surface_channels) if surface_channels else None
+        )
         if grid % self.unet.multiple:
             raise UserError(
                 f"model.grid: must be a multiple of {self.unet.multiple} for {len(widths)} model.widths, got {grid}"
@@ -115,7 +123,8 @@ class PlaneSweepStereoModel(PixelStereoModel):
         if self.scout is not None and self.locator is not None:
             grid = self.locator(self.scout(pair.maps, grid))
         volume_BCDHW = self.unet(self.sweep(pair.maps, grid.detach()))
-        return PlaneSweepCode(pair.maps, pair.global_BC, grid, volume_BCDHW)
+        surface_VB2HW = self.surface(volume_BCDHW, grid.detach(), pair.maps) if self.surface else None
+        return PlaneSweepCode(pair.maps, pair.global_BC, grid, volume_BCDHW, surface_VB2HW)
 
     def guidance(self, code: PlaneSweepCode, points_BN3: Tensor, occupied_BN: Tensor) -> Tensor:
         """The locator's loss."""
@@ -123,11 +132,18 @@ class PlaneSweepStereoModel(PixelStereoModel):
             return super().guidance(code, points_BN3, occupied_BN)
         return locator_loss(code.grid, points_BN3, occupied_BN)
 
-    def token(self, code: PixelStereoCode, points_BN3: Tensor) -> Tensor:
-        """Evidence, place, place in the grid, and the volume's features ``(B, N, T)`` of each point."""
+    def seen_depths(self, code: PlaneSweepCode) -> Tensor | None:
+        """Of the surface, if it is looked for."""
+        return None if code.surface_VB2HW is None else code.surface_VB2HW[:, :, 0]
+
+    def token(self, code: PixelStereoCode, points_BN3: Tensor, projections: Projections) -> Tensor:
+        """Evidence, place, the volume's features, place behind the surface and in the grid ``(B, N, T)``."""
         assert isinstance(code, PlaneSweepCode)
         local_BN3 = code.grid.detach().to_local(points_BN3)
-        parts = [super().token(code, points_BN3), sample_volume(code.volume_BCDHW, local_BN3).mT]
+        volume_BNC = sample_volume(code.volume_BCDHW, local_BN3).mT
+        parts = [super().token(code, points_BN3, projections), volume_BNC]
+        if self.surface is not None and code.surface_VB2HW is not None:
+            parts.append(self.surface.tell_points(code.surface_VB2HW, projections))
         if self.locator is not None:
             parts.append(local_BN3.clamp(-1, 1))
         return torch.cat(parts, dim=-1)

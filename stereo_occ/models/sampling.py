@@ -91,23 +91,32 @@ def cell_pixels(height: int, width: int, stride: int, device: torch.device) -> T
     return torch.stack([u_HW, v_HW, torch.ones_like(u_HW)], dim=-1).view(-1, 3)
 
 
-def ray_maps(K_VB33: Tensor, camera_from_rig_VB44: Tensor, height: int, width: int, stride: int) -> Tensor:
-    """Pluecker coordinates ``(V, B, 6, height, width)`` of the lines of sight through a map's cells.
-
-    The unit direction in the rig frame, then the moment about the fixation point, metres: with them a map says where
-    its camera is (Sitzmann et al., "Light Field Networks", NeurIPS 2021).
+def cell_rays(
+    K_VB33: Tensor, camera_from_rig_VB44: Tensor, height: int, width: int, stride: int
+) -> tuple[Tensor, Tensor]:
+    """Lines of sight through a map's cells, rig frame.
 
     Args:
         height, width: of the map.
         stride: image pixels per cell.
+
+    Returns:
+        Centres of the cameras ``(V, B, 1, 3)``, metres, and directions ``(V, B, height * width, 3)`` that go one metre
+        along the optical axis.
     """
-    device = K_VB33.device
-    with torch.autocast(device.type, enabled=False):
-        pixels_P3 = cell_pixels(height, width, stride, device)
+    with torch.autocast(K_VB33.device.type, enabled=False):
+        pixels_P3 = cell_pixels(height, width, stride, K_VB33.device)
         R_VB33, t_VB3 = camera_from_rig_VB44[..., :3, :3].float(), camera_from_rig_VB44[..., :3, 3].float()
         directions_VBP3 = pixels_P3 @ torch.linalg.inv(K_VB33.float()).mT @ R_VB33
-        directions_VBP3 = normalize(directions_VBP3, dim=-1)
-        centers_VB13 = -(t_VB3[..., None, :] @ R_VB33)
-        moments_VBP3 = torch.linalg.cross(centers_VB13.expand_as(directions_VBP3), directions_VBP3)
-    rays_VBP6 = torch.cat([directions_VBP3, moments_VBP3], dim=-1)
-    return rays_VBP6.mT.reshape(*K_VB33.shape[:2], 6, height, width)
+        return -(t_VB3[..., None, :] @ R_VB33), directions_VBP3
+
+
+def ray_maps(centers_VB13: Tensor, directions_VBP3: Tensor) -> Tensor:
+    """Pluecker coordinates ``(V, B, 6, P)`` of lines of sight.
+
+    The unit direction in the rig frame, then the moment about the fixation point, metres: with them a map says where
+    its camera is (Sitzmann et al., "Light Field Networks", NeurIPS 2021).
+    """
+    directions_VBP3 = normalize(directions_VBP3, dim=-1)
+    moments_VBP3 = torch.linalg.cross(centers_VB13.expand_as(directions_VBP3), directions_VBP3)
+    return torch.cat([directions_VBP3, moments_VBP3], dim=-1).mT

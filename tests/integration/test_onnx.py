@@ -32,6 +32,7 @@ MODELS = {
     "mono": ["model.encoder.weights=null", "model.decoder.hidden=16"],
     "pixel_stereo": ["model.hidden=16", "model.blocks=2", "model.code_size=16"],
     "plane_sweep_stereo": ["model.grid=8", "model.hidden=16", "model.blocks=2", "model.code_size=16"],
+    "plane_sweep_guided": ["model.grid=8", "model.hidden=16", "model.blocks=2", "model.code_size=16"],
 }
 
 

@@ -67,6 +67,14 @@ def test_maps_of_the_left_images_alone(batch):
     assert {name: float(value) for name, value in losses.items()} == {"mask": pytest.approx(0), "depth": 0}
 
 
+def test_the_surface_that_a_model_finds_is_measured_as_the_depth_is(batch):
+    wrong = torch.tensor([0.3, 0.5]).view(2, 1, 1, 1).expand(2, 2, 2, 2)  # left views and right ones
+    losses = auxiliary_losses(
+        Fixed(torch.zeros(4, 2, 2), torch.zeros(4, 2, 2)), torch.zeros(4, 4, 2, 2), batch, wrong
+    )
+    torch.testing.assert_close(losses["surface"], torch.tensor((0.6 * 1 + 0.3 * 0.5) / 1.5))
+
+
 def test_heads_learn(batch):
     torch.manual_seed(0)
     heads, features = AuxiliaryHeads(4), torch.randn(4, 4, 4, 4)

@@ -88,6 +88,7 @@ def leave_zero(model):
         (["model=plane_sweep_stereo"], "paper", 224, 2_963_825),
         (["model=plane_sweep_stereo", "model.views=left"], "laptop", 64, 2_963_825),
         (["model=plane_sweep_stereo", "model/encoder=dilated_resnet"], "laptop", 64, 4_841_985),
+        (["model=plane_sweep_guided"], "laptop", 64, 2_978_930),
     ],
 )
 def test_parameter_counts(overrides, scale, side, count):
@@ -116,9 +117,11 @@ def test_networks_of_timm_of_unlike_families_serve_as_encoders(backbone):
 
 
 @pytest.mark.parametrize("encoder", ENCODERS)
-@pytest.mark.parametrize("name", ["mono", "pixel_stereo", "plane_sweep_stereo", *COST_VOLUMES])
+@pytest.mark.parametrize(
+    "name", ["mono", "pixel_stereo", "plane_sweep_stereo", "plane_sweep_guided", *COST_VOLUMES]
+)
 def test_every_combination_builds_and_every_parameter_learns(name, encoder):
-    choice = [f"model={name}"] if name in MODELS else ["model=stereo", f"model/cost_volume={name}"]
+    choice = ["model=stereo", f"model/cost_volume={name}"] if name in COST_VOLUMES else [f"model={name}"]
     scratch = {"resnet18": [SCRATCH], "timm": ["model.encoder.pretrained=false"]}.get(encoder, [])
     model = leave_zero(build(*choice, f"model/encoder={encoder}", *scratch))
     points = torch.rand(3, 40, 3) - 0.5

@@ -30,6 +30,7 @@ PIXEL = {
 SWEEP = PIXEL | {"name": "plane_sweep_stereo", "grid": 8, "widths": [8, 16]}
 
 AROUND_OBJECT = SWEEP | {"around": "object"}
+GUIDED = AROUND_OBJECT | {"surface_channels": 4}
 
 
 def build(config, **settings):
@@ -48,7 +49,9 @@ def some_points(batch, count=200, seed=0):
     return torch.rand(batch, count, 3, generator=torch.Generator().manual_seed(seed)) - 0.5
 
 
-@pytest.fixture(params=[PIXEL, SWEEP, AROUND_OBJECT], ids=["pixel", "sweep", "around object"])
+@pytest.fixture(
+    params=[PIXEL, SWEEP, AROUND_OBJECT, GUIDED], ids=["pixel", "sweep", "around object", "guided"]
+)
 def config(request):
     return request.param
 

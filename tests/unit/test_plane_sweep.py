@@ -174,9 +174,9 @@ def test_the_volume_alone_tells_samples_apart():
     with torch.no_grad():
         code = model.encode(random_pairs(2))
         points = torch.rand(2, 30, 3) - 0.5
-        same = model.token(code, points)
+        same = model.token(code, points, code.maps.project(points))
         code.volume_BCDHW[1] += 1
-        other = model.token(code, points)
+        other = model.token(code, points, code.maps.project(points))
     torch.testing.assert_close(same[0], other[0])
     torch.testing.assert_close(same[1, :, :-4], other[1, :, :-4])
     torch.testing.assert_close(same[1, :, -4:] + 1, other[1, :, -4:])

@@ -7,7 +7,14 @@ from rigs import HEIGHT, WIDTH, cameras_VB, random_rig
 from torch.nn.functional import avg_pool2d
 
 from stereo_occ.geometry.camera import toed_in_rig, transform_points
-from stereo_occ.models.sampling import cell_centers, project_points, ray_maps, sample_maps, sample_volume
+from stereo_occ.models.sampling import (
+    cell_centers,
+    cell_rays,
+    project_points,
+    ray_maps,
+    sample_maps,
+    sample_volume,
+)
 
 
 @pytest.fixture
@@ -91,12 +98,17 @@ def test_a_volume_of_its_cells_centres_gives_back_points():
 @pytest.mark.parametrize("stride", [1, 4])
 def test_lines_of_sight_pass_through_their_cells_and_their_camera(rigs, stride):
     height, width = HEIGHT // stride, WIDTH // stride
-    rays = ray_maps(*cameras_VB(rigs), height, width, stride).double().numpy()
+    centers, steps = cell_rays(*cameras_VB(rigs), height, width, stride)
+    rays = ray_maps(centers, steps).double().numpy()
     v, u = np.meshgrid(np.arange(height), np.arange(width), indexing="ij")
     cell_centers_in_pixels = stride * np.stack([u, v], axis=-1).reshape(-1, 2) + (stride - 1) / 2
     for index, rig in enumerate(rigs):
         for view, camera in enumerate(rig.cameras):
             directions, moments = rays[view, index].reshape(2, 3, -1).transpose(0, 2, 1)
+            np.testing.assert_allclose(centers[view, index, 0], camera.center, atol=1e-6)
+            pixels, depths = camera.project(camera.center + 0.7 * steps[view, index].double().numpy())
+            np.testing.assert_allclose(pixels, cell_centers_in_pixels, atol=1e-3)
+            np.testing.assert_allclose(depths, 0.7, atol=1e-6)
             pixels, depths = camera.project(camera.center + 0.7 * directions)
             np.testing.assert_allclose(pixels, cell_centers_in_pixels, atol=1e-3)
             assert (depths > 0).all()
