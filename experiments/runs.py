@@ -12,6 +12,7 @@ SHORT, RECIPE, LONGER, FREE, FIELD = (
 )
 AID = "auxiliary=mask_depth"
 AIDED = f"model=plane_sweep_stereo {AID}"
+GUIDED = f"model=plane_sweep_guided {AID}"
 #: Settings of each run; those of a family are compared with its :data:`MONO`.
 RUNS = {
     SHORT / "mono": "model=mono model.encoder.weights=null steps=4000",
@@ -23,6 +24,7 @@ RUNS = {
     RECIPE / "plane_sweep_mono_aided": f"experiment=recipe model=plane_sweep_mono {AID} steps=10000",
     RECIPE / "plane_sweep_stereo": "experiment=recipe model=plane_sweep_stereo steps=10000",
     RECIPE / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=10000",
+    RECIPE / "plane_sweep_guided": f"experiment=recipe {GUIDED} steps=10000",
     LONGER / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=20000",
     FREE / "mono_scratch": "experiment=recipe placement=free model=mono_scratch steps=10000",
     FREE / "plane_sweep_stereo_aided": f"experiment=recipe placement=free {AIDED} steps=10000",

@@ -18,6 +18,7 @@ COSTS = {
     "pixel_stereo": ("pixel_stereo", "pixel_stereo"),
     "plane_sweep_stereo": ("plane_sweep_stereo", "plane_sweep_stereo"),
     "plane_sweep_stereo_aided": ("plane_sweep_stereo", "plane_sweep_stereo"),
+    "plane_sweep_guided": ("plane_sweep_guided", "plane_sweep_guided"),
 }
 
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Every model on a quarter of the paper's schedule, the plane sweep also with auxiliary tasks and so its twin of one view.
+# Every model on a quarter of the paper's schedule, the plane sweep also with auxiliary tasks and so its twin of one view;
+# the guided one with them alone.
 # Results go beside this file.
 set -euo pipefail
 family=recipe_10k
@@ -12,6 +13,7 @@ learn pixel_stereo 10000 model=pixel_stereo
 learn plane_sweep_mono_aided 10000 model=plane_sweep_mono auxiliary=mask_depth
 learn plane_sweep_stereo 10000 model=plane_sweep_stereo
 learn plane_sweep_stereo_aided 10000 model=plane_sweep_stereo auxiliary=mask_depth
+learn plane_sweep_guided 10000 model=plane_sweep_guided auxiliary=mask_depth
 against stereo_against_mono $family/plane_sweep_stereo $family/mono_scratch
 against paper_stereo_against_mono $family/stereo $family/mono_scratch
 against signed_against_paper_stereo $family/stereo_signed $family/stereo
@@ -19,3 +21,5 @@ against pixel_stereo_against_paper_stereo $family/pixel_stereo $family/stereo
 against aided_against_mono $family/plane_sweep_stereo_aided $family/mono_scratch
 against aided_against_its_mono $family/plane_sweep_stereo_aided $family/plane_sweep_mono_aided
 against aided_against_unaided $family/plane_sweep_stereo_aided $family/plane_sweep_stereo
+against guided_against_mono $family/plane_sweep_guided $family/mono_scratch
+against guided_against_aided $family/plane_sweep_guided $family/plane_sweep_stereo_aided
