@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What the best model (../recipe_20k) makes of pairs from which something is taken that it was trained with. Nothing is
+# What the plane sweep of ../recipe_20k makes of pairs from which something is taken that it was trained with. Nothing is
 # trained. Results go beside this file.
 set -euo pipefail
 cd "$(dirname "$0")/../.."

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What stereo is for: size and distance unknown (placement=free), mono and the best model, on a quarter of the paper's
+# What stereo is for: size and distance unknown (placement=free), mono and the aided plane sweep, on a quarter of the paper's
 # schedule. Results go beside this file.
 set -euo pipefail
 family=free_10k

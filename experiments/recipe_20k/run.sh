@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The best model on twice the schedule of ../recipe_10k; its weights are shipped as paper_rig. Results
+# The plane sweep with auxiliary tasks on twice the schedule of ../recipe_10k; its weights are shipped as paper_rig. Results
 # go beside this file.
 set -euo pipefail
 family=recipe_20k
