@@ -42,21 +42,30 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def remove_partial(files: Iterable[Path]) -> None:
-    """Of partial files, remove those that processes of this machine have left behind that are no more."""
-    for partial in files:
-        _, process, _ = partial.name.rsplit(".", 2)
-        if f".{socket.gethostname()}.{process}." in partial.name and not _is_alive(int(process)):
-            partial.unlink(missing_ok=True)
+    """Of partial files, remove those that are :func:`left_behind`."""
+    for partial in filter(left_behind, files):
+        partial.unlink(missing_ok=True)
+
+
+def left_behind(partial: Path) -> bool:
+    """Whether a process of this machine that is no more has begun this partial file."""
+    _, process, _ = partial.name.rsplit(".", 2)
+    return f".{socket.gethostname()}.{process}." in partial.name and not _is_alive(int(process))
 
 
 def _is_alive(process: int) -> bool:
+    """Whether it runs; one that was killed may stay in the table of processes for seconds, as a zombie."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
     except PermissionError:  # another user's
+        pass
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:  # a system without /proc
         return True
-    return True
+    return state != "Z"
 
 
 def write_whole(path: Path, data: bytes) -> None:

@@ -20,8 +20,8 @@ from stereo_occ.data import prepare as prepare_module
 from stereo_occ.data.config import SliceConfig
 from stereo_occ.data.prepare import prepare
 from stereo_occ.data.shard import Shard
-from stereo_occ.data.shard_writing import partial_path
 from stereo_occ.errors import UserError
+from stereo_occ.writing import left_behind, partial_path
 
 SMALL = [
     "data.image_side=32", "data.views=2", "data.pool_size=500", "scale.counts={mug:2,bowl:1,bottle:1}",
@@ -76,12 +76,12 @@ def test_an_interrupted_rendering_goes_on_where_it_stopped(rendered, tmp_path, m
             render(tmp_path)
     first = times(tmp_path)
     assert len(first) == 2
-    left_behind = partial_path(next(iter(first)), socket.gethostname(), 2**22 - 1)
-    left_behind.write_bytes(b"half a shard of a process that was killed")
+    of_no_process = partial_path(next(iter(first)), socket.gethostname(), 2**22 - 1)
+    of_no_process.write_bytes(b"half a shard of a process that was killed")
     render(tmp_path)
     assert contents(tmp_path) == contents(rendered)
     assert {path: time for path, time in times(tmp_path).items() if path in first} == first
-    assert not left_behind.exists()
+    assert not of_no_process.exists()
 
 
 def test_objects_do_not_depend_on_which_others_there_are(rendered, tmp_path):
@@ -169,6 +169,8 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_bytes(rendered, tmp_path):
         time.sleep(0.01)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
+    while not all(map(left_behind, tmp_path.rglob("*.part"))):
+        time.sleep(0.01)
     first = times(tmp_path)
     assert first
     render(tmp_path, workers=2)

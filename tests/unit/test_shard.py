@@ -18,7 +18,7 @@ from stereo_occ.data import shard as shard_module
 from stereo_occ.data.shard import VERSION, Shard, checksum_path
 from stereo_occ.data.shard_writing import write_shard
 from stereo_occ.errors import UserError
-from stereo_occ.writing import partial_path, remove_partial, write_whole
+from stereo_occ.writing import left_behind, partial_path, remove_partial, write_whole
 
 
 def contents(path):
@@ -247,3 +247,14 @@ def test_what_dead_processes_left_is_removed_and_the_rest_kept(tmp_path):
     left_behind.write_bytes(b"")
     write_whole(path, b"again")
     assert set(path.parent.iterdir()) == {path, checksum_path(path), another_machines}
+
+
+def test_a_process_that_nobody_has_asked_about_since_it_ended_is_no_more(tmp_path):
+    """Its number is still taken, which says nothing of the file it has left."""
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
+        partial = partial_path(tmp_path / "cup.h5", socket.gethostname(), process.pid)
+        assert not left_behind(partial)
+        process.kill()
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        os.kill(process.pid, 0)
+        assert left_behind(partial)
