@@ -6,24 +6,39 @@ macro, with the 95 % interval of the bootstrap over objects, and the paired diff
 
 import json
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import figures
 import numpy as np
 import tables
-from runs import FIELD, HERE, LONGER, MONO, RUNS, SHORT, load, rows_of
+from runs import FIELD, FREE, HERE, LONGER, MONO, RECIPE, RUNS, SHORT, load, rows_of
 
 from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 
 PROJECT = HERE.parent
 #: Pages and the tables in them, each between ``<!-- results:NAME -->`` and ``<!-- results:end -->``.
-PAGES = {
-    "README.md": [tables.trained],
-    "docs/metrics.md": [tables.floors],
-    "docs/models.md": [tables.cost, tables.models, tables.speed],
-    "experiments/recipe_10k/README.md": [tables.over_mono, tables.parts],
-    "docs/experiments.md": [tables.probes, tables.ablation, tables.precision],
+PAGES: dict[str, dict[str, Callable[[], str]]] = {
+    "README.md": {"trained": tables.trained},
+    "docs/metrics.md": {"floors": tables.floors},
+    "docs/models.md": {"cost": tables.cost, "models": tables.models, "speed": tables.speed},
+    "experiments/recipe_10k/README.md": {
+        "over_mono": partial(tables.over_mono, RECIPE, "test", ("iou", "iou_unrotated", "handle_recall")),
+        "parts": tables.parts,
+    },
+    "experiments/free_10k/README.md": {
+        "reached": partial(tables.reached, FREE),
+        "over_mono": partial(tables.over_mono, FREE, "test", ("iou", "handle_recall")),
+        "over_mono_real": partial(tables.over_mono, FREE, "real", ("iou",)),
+    },
+    "experiments/field/README.md": {"field": tables.field},
+    "docs/experiments.md": {
+        "probes": tables.probes,
+        "ablation": tables.ablation,
+        "precision": tables.precision,
+    },
 }
 WITH_INTERVALS = (
     "iou", "iou_bbox", "iou_unrotated", "handle_recall", "neck_recall", "cavity_empty", "chamfer_l1",
@@ -89,8 +104,8 @@ def main() -> None:
     figures.recipe_curves()
     figures.examples(LONGER / "plane_sweep_stereo_aided")
     for page, made in PAGES.items():
-        for table in made:
-            fill(PROJECT / page, table.__name__, table())
+        for name, table in made.items():
+            fill(PROJECT / page, name, table())
 
 
 if __name__ == "__main__":

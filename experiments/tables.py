@@ -4,11 +4,32 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from runs import CATEGORIES, FLOORS, HERE, MONO, RECIPE, RUNS, SHORT, load, metrics_of, rows_of, runs_of
+from runs import (
+    CATEGORIES,
+    FIELD,
+    FLOORS,
+    HERE,
+    MONO,
+    RECIPE,
+    RUNS,
+    SHORT,
+    load,
+    metrics_of,
+    rows_of,
+    runs_of,
+)
 
 BASELINES = ("visual_hull", "sgm", "mean_shape", "nearest_shape", "truth")
 PROBED = (300, 600, 900, 1200, 2100, 3000)  # steps
 FULL = 40_000  # steps
+#: Where the weights for photographs are measured.
+BEFORE_CAMERAS = {
+    "test": "test objects",
+    "real": "real objects",
+    "zed_mini": "real objects, ZED Mini",
+    "realsense_d435": "real objects, RealSense D435",
+    "photographs": "real objects, ZED Mini, among photographs",
+}
 #: Names of the recipe's runs in the tables of cost and of speed.
 COSTS = {
     "mono_scratch": ("mono, resnet18", "mono"),
@@ -83,19 +104,55 @@ def models() -> str:
     return _markdown(head, rows)
 
 
-def over_mono() -> str:
-    """What each run of the recipe has over mono on test objects, with intervals."""
+def reached(family: Path) -> str:
+    """What the runs of a family reach."""
+    head = (
+        "run", "test `iou` (mug / bowl / bottle)", "`iou_bbox`", "`f_score_2`", "`handle_recall`",
+        "real `iou` (mug / bowl / bottle)",
+    )  # fmt: skip
+    rows = []
+    for folder in runs_of(family):
+        test, real = (metrics_of(folder, where) for where in ("test", "real"))
+        values = (f"{test[f'test/{metric}']:.2f}" for metric in ("f_score_2", "handle_recall"))
+        rows.append(
+            [
+                f"`{folder.name}`",
+                _by_category(test),
+                f"{test['test/iou_bbox']:.3f}",
+                *values,
+                _by_category(real),
+            ]
+        )
+    return _markdown(head, rows)
+
+
+def over_mono(family: Path, where: str, metrics: Sequence[str]) -> str:
+    """What each run of a family has over its mono on ``test`` or ``real`` objects, with intervals."""
     results = load(HERE / "results.json")
     rows = []
-    for folder in (folder for folder in runs_of(RECIPE) if folder.name != MONO):
-        differences = results[f"{RECIPE.name}/{folder.name}"]["test"]["over mono_scratch"]
-        for metric in ("iou", "iou_unrotated", "handle_recall"):
+    for folder in (folder for folder in runs_of(family) if folder.name != MONO):
+        differences = results[f"{family.name}/{folder.name}"][where]["over mono_scratch"]
+        for metric in metrics:
             found = differences[metric]
-            name = f"`{folder.name}`" if metric == "iou" else ""
+            name = f"`{folder.name}`" if metric == metrics[0] else ""
             rows.append(
                 [name, f"`{metric}`", *(_interval(found.get(column)) for column in (*CATEGORIES, "macro"))]
             )
     return _markdown(("", "", *CATEGORIES, "macro"), rows)
+
+
+def field() -> str:
+    """The weights for photographs before one camera and another."""
+    head = ("", "`iou` (mug / bowl / bottle)", "`height_error`, `width_error`", "`handle_recall`")
+    rows = []
+    for where, name in BEFORE_CAMERAS.items():
+        metrics = metrics_of(FIELD, where)
+        errors = (f"{metrics[f'test/{side}_error'] * 1000:.0f} mm" for side in ("height", "width"))
+        handles = metrics.get("test/handle_recall")
+        rows.append(
+            [name, _by_category(metrics), ", ".join(errors), "" if handles is None else f"{handles:.2f}"]
+        )
+    return _markdown(head, rows)
 
 
 def parts() -> str:
