@@ -20,6 +20,7 @@ from stereo_occ.data.config import DATA_SCHEMAS, DataConfig, SliceConfig
 from stereo_occ.data.controls import ControlConfig
 from stereo_occ.data.placement import PlacementConfig
 from stereo_occ.data.rigs import RIG_SCHEMAS, RigConfig, ToedInRigConfig
+from stereo_occ.decision import DecisionRule
 from stereo_occ.errors import UserError
 from stereo_occ.inference_config import ExportConfig, ReconstructConfig
 from stereo_occ.loggers.config import LoggerConfig
@@ -130,6 +131,7 @@ class ValidationConfig:
     points: int = MISSING  # per view, for each of the box and the cube
     checkpoint_interval: int = MISSING  # steps between copies of the latest state
     keep_all: bool = MISSING  # keep the weights of every validation, not of the best one alone
+    decision: DecisionRule = DecisionRule.fixed  # what the threshold that is chosen refers to
 
 
 @dataclass

@@ -9,7 +9,8 @@
     config: the settings of the evaluation.
     subset, data, objects, views, points: what was measured, and the folder of its shards.
     split: ``hash`` of the names of training and evaluated objects, see :func:`~stereo_occ.provenance.split_hash`.
-    threshold: decision threshold, chosen on validation objects.
+    decision: ``threshold``, chosen on validation objects, and ``rule``, see :mod:`stereo_occ.decision`.
+    threshold: decision threshold on the probability, mean over the views.
     skipped: mesh files that gave no object.
     failures: number of object-views by failure; they are counted in every mean.
     meshes: how many views per object had their mesh measured, at which resolution, from how many points.
@@ -24,6 +25,7 @@ import logging
 import time
 from collections import Counter
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import torch
@@ -99,7 +101,7 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
         }
         hardware = settings.trainer
         predictor = LearnedPredictor(
-            network.model, network.threshold, hardware.accelerator, hardware.precision
+            network.model, network.decision, hardware.accelerator, hardware.precision
         )
     folder.mkdir(parents=True, exist_ok=True)
     meshes = MeshSettings(settings.meshes, settings.mesh_resolution, settings.surface_points)
@@ -113,7 +115,8 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
         keeper.keep if settings.keep else None,
     )
     keeper.write_index()
-    metrics = _metrics(result, predictor.threshold)
+    threshold = round(fmean(result.thresholds), 6)
+    metrics = _metrics(result, threshold)
     assert data.prepared is not None
     skipped = [vars(file) for file in data.prepared.skipped]
     write_csv(folder / "per_object.csv", result.rows)
@@ -131,7 +134,8 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
             "views": settings.views,
             "points": settings.points,
             "split": split_facts(cfg, settings, trained, data),
-            "threshold": predictor.threshold,
+            "decision": {"threshold": predictor.decision.threshold, "rule": predictor.decision.rule.value},
+            "threshold": threshold,
             "control": plain(trained.control) if settings.baseline is None else None,
             "skipped": len(skipped),
             "failures": dict(Counter(row["failure"] for row in result.rows if row["failure"])),

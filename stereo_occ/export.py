@@ -40,7 +40,7 @@ def export(cfg: DictConfig) -> list[Path]:
     run, prefix = Path(settings.checkpoint).parent, Path(settings.output)
     description = {
         "step": trained.step,
-        "threshold": trained.threshold,
+        "threshold": trained.decision.threshold,
         "metrics": _metrics(settings.metrics, run),
         "config": checkpoint[KEY]["config"],
     }

@@ -45,11 +45,13 @@ class Measurement:
     Attributes:
         rows: one per object-view: ``category``, ``object_id``, ``view``, ``failure`` (empty where there is none) and
             every metric of :data:`~stereo_occ.metrics.summary.METRICS`, None where it does not apply.
+        thresholds: decision threshold on the probability, one per object-view.
         reliability: by category, sums of :func:`~stereo_occ.metrics.points.reliability_sums` over the cube's points.
         counts: by category, sums of :func:`~stereo_occ.metrics.curves.logit_counts` likewise.
     """
 
     rows: list[dict[str, Any]] = field(default_factory=list)
+    thresholds: list[float] = field(default_factory=list)
     reliability: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     counts: dict[str, NDArray[np.int64]] = field(default_factory=dict)
 
@@ -75,13 +77,15 @@ def measure(
             regions = [_regions(view) for view in views]
             asked = {name: queries.points_BN3 for name, queries in batch.queries.items()} | _padded(regions)
             logits = predictor.logits(views, batch.views, asked)
-            for i, view in enumerate(views):
+            thresholds = predictor.decision.thresholds(logits["cube"]).tolist()
+            result.thresholds += thresholds
+            for i, (view, threshold) in enumerate(zip(views, thresholds, strict=True)):
                 of_view = {name: logits_BN[i] for name, logits_BN in logits.items()}
                 occupied = {name: queries.occupied_BN[i] > 0.5 for name, queries in batch.queries.items()}
                 answers = {name: of_view[name][: len(points)] for name, points in regions[i].items()}
                 values: dict[str, float | None] = dict.fromkeys(METRICS)
-                values |= point_metrics(of_view, occupied, predictor.threshold)
-                values |= region_metrics(answers, predictor.threshold)
+                values |= point_metrics(of_view, occupied, threshold)
+                values |= region_metrics(answers, threshold)
                 failures = ["NaN"] if any(x.isnan().any() for x in of_view.values()) else []
                 place = (first + i) % len(dataset.views)  # among the object's views
                 if place < meshes.views:

@@ -7,7 +7,7 @@ Keys of every ``metrics.json``:
 
 Of a training besides:
     parameters: number of trained parameters of the model.
-    threshold: decision threshold chosen on the validation objects at the best step.
+    threshold: of the decision, chosen on the validation objects at the best step.
     best: the entry of ``history`` with the highest ``val/iou``.
     history: one entry per validation with ``step``, ``val/loss`` and the ``val/...`` metrics of the protocol. A value
         that is not finite is null and named in ``not_finite``.

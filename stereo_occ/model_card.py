@@ -25,7 +25,7 @@ def model_card(
         f"# {name}",
         "",
         f"`model={config['model']['name']}`, {parameters / 1e6:.1f} M parameters, {size / 1e6:.1f} MB, "
-        f"images of {data['image_side']} pixels, decision threshold {description['threshold']:.2f}.",
+        f"images of {data['image_side']} pixels, decision threshold {description['threshold']:.2f}{_rule(config)}.",
         "",
         "## Use",
         "```",
@@ -59,6 +59,11 @@ def training_command(folder: Path) -> str | None:
         return None
     words = [line.removeprefix("- ").strip() for line in notes.read_text(encoding="utf-8").splitlines()]
     return " ".join(["python -m stereo_occ.train", *(word for word in words if word not in ("[]", ""))])
+
+
+def _rule(config: Mapping[str, Any]) -> str:
+    rule = config["validation"].get("decision", "fixed")
+    return "" if rule == "fixed" else f" ({rule})"
 
 
 def _table(metrics: Mapping[str, Any]) -> list[str]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from omegaconf import OmegaConf
 
 from stereo_occ.config import TrainConfig, training_config
+from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.models.base import POINTS_IN_CACHE, StereoViews
 from stereo_occ.onnx_export import INPUTS, onnx_paths
@@ -23,7 +24,7 @@ class OnnxModel:
     encoder: Any
     decoder: Any
     config: TrainConfig
-    threshold: float
+    decision: Decision
     name: str
 
     def predict(self, views: StereoViews) -> Occupancy:
@@ -88,7 +89,7 @@ def load_onnx(name: str, threads: int | None = None) -> OnnxModel:
     ) as error:
         raise UserError(f"checkpoint={name}: its files are damaged; export it again") from error
     assert isinstance(typed, TrainConfig)
-    return OnnxModel(encoder, decoder, typed, threshold, name)
+    return OnnxModel(encoder, decoder, typed, Decision(threshold, typed.validation.decision), name)
 
 
 def run(session: Any, arrays: dict[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:

@@ -6,7 +6,7 @@ Keys of the JSON file:
     version: :data:`VERSION`; 1 had no checksums.
     config: the training configuration.
     step: of the training.
-    threshold: decision threshold on the probability.
+    threshold: of the decision, whose rule is in the configuration.
     metrics: of the evaluation, where there was one.
     sha256: of each file beside it, by what its name has after that of the weights.
     checksum: SHA-256 of all this, as JSON with sorted keys.

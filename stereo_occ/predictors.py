@@ -11,6 +11,7 @@ from trimesh import Trimesh
 
 from stereo_occ.data.batch import map_tensors
 from stereo_occ.data.shard import Shard
+from stereo_occ.decision import Decision
 from stereo_occ.geometry.camera import Camera, StereoRig
 from stereo_occ.geometry.pose import Pose
 from stereo_occ.models.base import OccupancyModel, StereoViews
@@ -46,10 +47,10 @@ class Predictor(Protocol):
     """Occupancy of views.
 
     Attributes:
-        threshold: decision threshold on the probability.
+        decision: from which probability on a point counts as inside.
     """
 
-    threshold: float
+    decision: Decision
 
     def logits(
         self, views: Sequence[ObjectView], pictures: StereoViews, points: Mapping[str, Tensor]
@@ -72,11 +73,11 @@ class Predictor(Protocol):
 class LearnedPredictor:
     """A trained network: it sees the pictures and their cameras, and nothing else."""
 
-    def __init__(self, model: OccupancyModel, threshold: float, accelerator: str, precision: str) -> None:
+    def __init__(self, model: OccupancyModel, decision: Decision, accelerator: str, precision: str) -> None:
         use_gpu = accelerator == "gpu" or (accelerator == "auto" and torch.cuda.is_available())
         self.device = torch.device("cuda" if use_gpu else "cpu")
         self.model = model.to(self.device).eval()
-        self.threshold = threshold
+        self.decision = decision
         self.precision = precision
 
     def logits(
@@ -92,7 +93,7 @@ class LearnedPredictor:
     def mesh(self, view: ObjectView, picture: StereoViews, resolution: int) -> Trimesh:
         with self._autocast():
             pictures = map_tensors(picture, lambda tensor: tensor.to(self.device))
-            return reconstruct(self.model, pictures, self.threshold, resolution)
+            return reconstruct(self.model, pictures, self.decision, resolution)
 
     @contextmanager
     def _autocast(self) -> Iterator[None]:

@@ -8,18 +8,22 @@ import torch
 from numpy.typing import NDArray
 from trimesh import Trimesh
 
+from stereo_occ.decision import Decision, DecisionRule
 from stereo_occ.meshing import SampledField, sample_field
 from stereo_occ.models.base import OccupancyModel, StereoViews
+
+#: Along each side of the cube, of the points that tell a pair's threshold.
+CELLS = 24
 
 #: Occupancy logits ``(N,)`` of points ``(N, 3)`` of the cube ``[-0.5, 0.5]^3``.
 Occupancy = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 
-def reconstruct(model: OccupancyModel, views: StereoViews, threshold: float, resolution: int) -> Trimesh:
+def reconstruct(model: OccupancyModel, views: StereoViews, decision: Decision, resolution: int) -> Trimesh:
     """The surface that the model sees in one stereo pair (``B = 1``), rig frame, metres.
 
     Args:
-        threshold: occupancy probability at the surface.
+        decision: where the surface is.
         resolution: cells along each side of the cube ``[-0.5, 0.5]^3``.
 
     Returns:
@@ -27,7 +31,8 @@ def reconstruct(model: OccupancyModel, views: StereoViews, threshold: float, res
     """
     was_training = model.training
     model.eval()
-    mesh = sample_cube(occupancy_of(model, views), threshold, resolution).surface()
+    occupancy = occupancy_of(model, views)
+    mesh = sample_cube(occupancy, threshold_of(decision, occupancy), resolution).surface()
     model.train(was_training)
     return mesh
 
@@ -44,6 +49,15 @@ def occupancy_of(model: OccupancyModel, views: StereoViews) -> Occupancy:
             return np.asarray(model.decode_all(code, points_BN3)[0].float().cpu().numpy())
 
     return logits
+
+
+def threshold_of(decision: Decision, occupancy: Occupancy) -> float:
+    """The occupancy probability at the surface of one pair."""
+    if decision.rule is DecisionRule.fixed:
+        return decision.threshold
+    middles_C = (np.arange(CELLS, dtype=np.float32) + 0.5) / CELLS - 0.5
+    points_N3 = np.stack(np.meshgrid(middles_C, middles_C, middles_C), axis=-1, dtype=np.float32)
+    return float(decision.thresholds(torch.from_numpy(occupancy(points_N3.reshape(-1, 3)))[None]))
 
 
 def sample_cube(occupancy: Occupancy, threshold: float, resolution: int) -> SampledField:

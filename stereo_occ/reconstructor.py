@@ -17,6 +17,7 @@ from trimesh.visual import ColorVisuals
 from stereo_occ.calibration import RealPair, read_calibration
 from stereo_occ.config import TrainConfig
 from stereo_occ.data.rigs import RectifiedRigConfig
+from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import transform_points
 from stereo_occ.mesh_output import simplified
@@ -29,7 +30,7 @@ from stereo_occ.photographs.locate import Found
 from stereo_occ.photographs.match import SIDES
 from stereo_occ.photographs.outline import preview
 from stereo_occ.photographs.photo import Photo, seen_by
-from stereo_occ.reconstruction import expected_iou, sample_cube
+from stereo_occ.reconstruction import expected_iou, sample_cube, threshold_of
 from stereo_occ.trained import Predictor, load_trained
 
 logger = logging.getLogger(__name__)
@@ -40,7 +41,7 @@ class SurfaceOptions:
     """How the surface is taken from the occupancy.
 
     Attributes:
-        threshold: occupancy probability at the surface; None: the checkpoint's own.
+        threshold: occupancy probability at the surface; None: what the checkpoint decides.
         resolution: cells along each side of the cube.
         steps: of the search for each vertex's true place.
         simplify: how far the surface may move for fewer faces, metres; None: not at all.
@@ -129,12 +130,12 @@ class Reconstructor:
     Args:
         config: of the model's training: how it wants to see a pair.
         predict: what the model says of a pair.
-        threshold: decision threshold on the probability.
+        decision: from which probability on a point counts as inside.
         name: of the checkpoint.
     """
 
-    def __init__(self, config: TrainConfig, predict: Predictor, threshold: float, name: str) -> None:
-        self.config, self.predict, self.threshold, self.name = config, predict, threshold, name
+    def __init__(self, config: TrainConfig, predict: Predictor, decision: Decision, name: str) -> None:
+        self.config, self.predict, self.decision, self.name = config, predict, decision, name
 
     @classmethod
     def from_checkpoint(
@@ -155,7 +156,7 @@ class Reconstructor:
             trained: Any = load_onnx(str(checkpoint), threads)
         else:
             trained = load_trained(str(checkpoint))
-        return cls(trained.config, trained.predict, trained.threshold, trained.name)
+        return cls(trained.config, trained.predict, trained.decision, trained.name)
 
     def __call__(
         self,
@@ -203,8 +204,10 @@ class Reconstructor:
             views = self._views(pair, photos, found, framing)
         with _timed(seconds, "encode"):
             occupancy = self.predict(views)
-        threshold = self.threshold if surface.threshold is None else surface.threshold
         with _timed(seconds, "extract"):
+            threshold = (
+                threshold_of(self.decision, occupancy) if surface.threshold is None else surface.threshold
+            )
             field = sample_cube(occupancy, threshold, surface.resolution)
             mesh = field.surface(surface.steps)
         if not len(mesh.faces):

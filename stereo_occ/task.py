@@ -14,6 +14,7 @@ from stereo_occ.averaging import WeightAverage
 from stereo_occ.checkpoint import KEY, VERSION
 from stereo_occ.config import TrainConfig
 from stereo_occ.data.batch import Batch
+from stereo_occ.decision import Decision
 from stereo_occ.group import gathered, share_buffers
 from stereo_occ.metrics.scores import Scores
 from stereo_occ.models.base import OccupancyModel
@@ -29,7 +30,7 @@ class OccupancyTask(lightning.LightningModule):
         record: the whole configuration as plain values; it goes into every checkpoint.
 
     Attributes:
-        threshold: decision threshold on the probability, chosen at each validation, kept in checkpoints.
+        threshold: of the decision, chosen at each validation, kept in checkpoints.
         scores: the views seen by the current or last evaluation.
         average: of the model's weights, if the training keeps one.
         auxiliary: heads on the encoder, while a training that asks for them lasts.
@@ -43,7 +44,7 @@ class OccupancyTask(lightning.LightningModule):
         self.model = model
         self.config = config
         self.record = record
-        self.scores = Scores()
+        self.scores = Scores(rule=config.validation.decision)
         self.register_buffer("threshold", torch.tensor(0.5))
         decay = config.averaging.decay
         self.average = None if decay is None else WeightAverage(model, decay)
@@ -52,6 +53,11 @@ class OccupancyTask(lightning.LightningModule):
     def configure_model(self) -> None:
         if self.auxiliary is None and self.config.auxiliary != AuxiliaryConfig():
             self.auxiliary = AuxiliaryHeads(self._encoder.channels)
+
+    @property
+    def decision(self) -> Decision:
+        """From which probability on a point counts as inside."""
+        return Decision(float(self.threshold), self.config.validation.decision)
 
     @property
     def _encoder(self) -> ImageEncoder:
@@ -96,7 +102,7 @@ class OccupancyTask(lightning.LightningModule):
             self.average.swap()
 
     def on_validation_epoch_start(self) -> None:
-        self.scores = Scores()
+        self.scores = Scores(rule=self.config.validation.decision)
 
     def validation_step(self, batch: Batch, batch_idx: int) -> dict[str, Tensor]:
         code = self.model.encode(batch.views)

@@ -10,6 +10,7 @@ from omegaconf import OmegaConf
 from stereo_occ.checkpoint import config_of, plain, read_checkpoint
 from stereo_occ.config import TrainConfig
 from stereo_occ.data.rigs import build_rig
+from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.flat import flat
 from stereo_occ.models.base import OccupancyModel, StereoViews
@@ -27,14 +28,14 @@ class TrainedModel:
 
     Attributes:
         config: of the training.
-        threshold: decision threshold on the probability.
+        decision: from which probability on a point counts as inside.
         step: of the training.
         name: as it was asked for.
     """
 
     model: OccupancyModel
     config: TrainConfig
-    threshold: float
+    decision: Decision
     step: int
     name: str
 
@@ -86,7 +87,7 @@ def trained_model(checkpoint: Mapping[str, Any], name: str) -> TrainedModel:
         raise UserError(
             f"checkpoint={name}: holds NaN or infinite numbers, so its training has diverged; use one of before"
         )
-    return TrainedModel(model.eval(), typed, threshold, step, name)
+    return TrainedModel(model.eval(), typed, Decision(threshold, typed.validation.decision), step, name)
 
 
 def begin_with(name: str, model: OccupancyModel, config: Mapping[str, Any]) -> None:

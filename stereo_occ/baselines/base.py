@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from trimesh import Trimesh
 
+from stereo_occ.decision import Decision
 from stereo_occ.meshing import extract_mesh
 from stereo_occ.models.base import StereoViews
 from stereo_occ.predictors import ObjectView
@@ -24,7 +25,7 @@ _MARGIN = 1e-4
 class Baseline(ABC):
     """A predictor that looks at a view once and then answers for any points."""
 
-    threshold = 0.5
+    decision = Decision(0.5)
 
     @abstractmethod
     def look(self, view: ObjectView) -> Field:
@@ -53,7 +54,7 @@ class Baseline(ABC):
             low=-0.5 * np.ones(3),
             high=0.5 * np.ones(3),
             resolution=resolution,
-            level=log(self.threshold / (1 - self.threshold)),
+            level=log(self.decision.threshold / (1 - self.decision.threshold)),
         )
 
 

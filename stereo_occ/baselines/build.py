@@ -18,6 +18,7 @@ from stereo_occ.baselines.nearest_shape import NearestShape
 from stereo_occ.baselines.posed_shape import TrueShape
 from stereo_occ.baselines.visual_hull import VisualHull
 from stereo_occ.data.dataset import EvaluationPairs
+from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.metrics.scores import Scores
 from stereo_occ.predictors import ObjectView
@@ -60,5 +61,5 @@ def _mean_shape(config: MeanShapeConfig, train: EvaluationPairs, val: Evaluation
         batch = val.__getitems__([item])
         points = {name: queries.points_BN3 for name, queries in batch.queries.items()}
         scores.update(batch, shape.logits([ObjectView(*val.locate(item))], batch.views, points))
-    shape.threshold = scores.best_threshold()
+    shape.decision = Decision(scores.best_threshold())
     return shape

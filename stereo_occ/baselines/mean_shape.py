@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from stereo_occ.baselines.base import Baseline, Field
+from stereo_occ.decision import Decision
 from stereo_occ.predictors import ObjectView
 
 
@@ -18,12 +19,12 @@ class MeanShape(Baseline):
 
     Args:
         occupancy_CCC: mean occupancy of the cells of the working cube, x, y, z.
-        threshold: chosen on validation objects.
+        decision: chosen on validation objects.
     """
 
-    def __init__(self, occupancy_CCC: NDArray[np.float64], threshold: float = 0.5) -> None:
+    def __init__(self, occupancy_CCC: NDArray[np.float64], decision: Decision = Baseline.decision) -> None:
         self.occupancy_CCC = occupancy_CCC.clip(0, 1)
-        self.threshold = threshold
+        self.decision = decision
 
     def look(self, view: ObjectView) -> Field:
         """The mean shape, whatever the view."""

@@ -13,6 +13,7 @@ from trimesh import Trimesh
 
 from stereo_occ.data.batch import Batch
 from stereo_occ.data.examples import examples
+from stereo_occ.decision import level_shift
 from stereo_occ.loggers.board import Board
 from stereo_occ.loggers.config import LoggerConfig
 from stereo_occ.loggers.curves import curves_picture
@@ -50,7 +51,7 @@ class Show(Callback):
         self.boards = boards
         self.shown_on = [board for board in boards if board.shows]
         self.settings = {group: settings[group] for group in SETTINGS}
-        self._answers: list[tuple[Tensor, Tensor]] = []
+        self._answers: list[tuple[Tensor, Tensor, Tensor]] = []
         self._truth_shown = False
 
     def on_fit_start(self, trainer: lightning.Trainer, pl_module: LightningModule) -> None:
@@ -67,15 +68,17 @@ class Show(Callback):
         dataloader_idx: int = 0,
     ) -> None:
         occupied_BN = batch.queries["bbox"].occupied_BN[:, :CURVE_POINTS]
-        self._answers.append((outputs["bbox"][:, :CURVE_POINTS].flatten(), occupied_BN.flatten()))
+        assert isinstance(pl_module, OccupancyTask)
+        shift_B = level_shift(pl_module.decision.rule, outputs["cube"])
+        self._answers.append((outputs["bbox"][:, :CURVE_POINTS].flatten(), occupied_BN.flatten(), shift_B))
 
     def on_validation_end(self, trainer: lightning.Trainer, pl_module: LightningModule) -> None:
         assert isinstance(pl_module, OccupancyTask)
-        logits_N, occupied_N = (torch.cat(parts).cpu() for parts in zip(*self._answers, strict=True))
+        logits_N, occupied_N, shift_V = (torch.cat(parts).cpu() for parts in zip(*self._answers, strict=True))
         self._answers.clear()
         if not self.shown_on:
             return
-        step, threshold = trainer.global_step, float(pl_module.threshold)
+        step, threshold = trainer.global_step, float(pl_module.decision.shifted(shift_V).mean())
         for board in self.shown_on:
             board.answers("val/precision_recall", logits_N.sigmoid(), occupied_N, step)
         self._picture("val/curves", curves_picture(logits_N, occupied_N, threshold), step)
@@ -83,7 +86,7 @@ class Show(Callback):
         for example in examples(data.evaluation_dataset("val"), self.config.examples):
             name = f"example/{example.id.object_id}"
             views = example.batch.to(pl_module.device).views
-            predicted = reconstruct(pl_module.model, views, threshold, self.config.mesh_resolution)
+            predicted = reconstruct(pl_module.model, views, pl_module.decision, self.config.mesh_resolution)
             self._mesh(f"{name}/predicted", predicted, step)
             if not self._truth_shown:
                 pair_CHW = torch.cat([views.left_BCHW[0], views.right_BCHW[0]], dim=-1)

@@ -8,23 +8,28 @@ from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from stereo_occ.data.batch import Batch, ViewId
+from stereo_occ.decision import DecisionRule, level_shift
 from stereo_occ.metrics.volumetric import best_threshold, category_means, iou_at_thresholds
 
 #: The metric that each set of evaluation points gives.
 METRICS = {"cube": "iou", "bbox": "iou_bbox", "unposed": "iou_unrotated"}
 
 #: Candidate decision thresholds on the occupancy probability.
-THRESHOLDS = torch.linspace(0.05, 0.95, 19)
+THRESHOLDS = torch.linspace(0.05, 0.95, 37)
 
 
 class Scores:
     """Loss on the points of the box, and IoU at every candidate threshold (increasing probabilities), of each view.
 
     What is summed up does not depend on the order in which views came, nor on how often one did.
+
+    Args:
+        rule: what the candidates refer to.
     """
 
-    def __init__(self, thresholds_T: Tensor = THRESHOLDS) -> None:
+    def __init__(self, thresholds_T: Tensor = THRESHOLDS, rule: DecisionRule = DecisionRule.fixed) -> None:
         self.thresholds_T = thresholds_T
+        self.rule = rule
         self._loss: dict[ViewId, Tensor] = {}
         self._iou: dict[str, dict[ViewId, Tensor]] = {name: {} for name in METRICS.values()}
 
@@ -33,9 +38,10 @@ class Scores:
         occupied_BN = batch.queries["bbox"].occupied_BN
         loss_BN = binary_cross_entropy_with_logits(logits["bbox"], occupied_BN, reduction="none")
         self._loss |= zip(batch.ids, loss_BN.mean(dim=1).cpu(), strict=True)
+        shift_B1 = level_shift(self.rule, logits["cube"])[:, None]
         for queries, metric in METRICS.items():
             iou_BT = iou_at_thresholds(
-                logits[queries], batch.queries[queries].occupied_BN > 0.5, self.thresholds_T
+                logits[queries] - shift_B1, batch.queries[queries].occupied_BN > 0.5, self.thresholds_T
             )
             self._iou[metric] |= zip(batch.ids, iou_BT.cpu(), strict=True)
 

@@ -71,11 +71,24 @@ def test_a_twin_is_evaluated_under_its_control(workshop, tmp_path):
     assert pairs["test/brier"] != pytest.approx(measured["test/brier"], abs=1e-6)
 
 
+def test_a_pairs_own_threshold_is_the_same_in_training_and_evaluation(workshop, tmp_path):
+    run = workshop.train(tmp_path / "run", "logger=none", "validation.decision=relative")
+    best = json.loads((run / "metrics.json").read_text())["best"]
+    measured = workshop.evaluate(run / "best.ckpt", tmp_path / "out", "subset=val")
+    for name in ("iou", "iou/mug", "iou_bbox"):
+        assert measured[f"test/{name}"] == pytest.approx(best[f"val/{name}"], abs=1e-6)
+    results = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert results["decision"] == {"rule": "relative", "threshold": pytest.approx(best["val/threshold"])}
+    assert 0 < results["threshold"] < results["decision"]["threshold"]  # no IoU that is expected is 1
+
+
 def test_results_are_files(run, evaluation):
     folder, metrics = evaluation
     results = json.loads((folder / "metrics.json").read_text())
     assert results["metrics"] == metrics
-    assert results["threshold"] == json.loads((run / "metrics.json").read_text())["threshold"]
+    assert results["threshold"] == pytest.approx(
+        json.loads((run / "metrics.json").read_text())["threshold"], abs=1e-6
+    )
     assert (results["subset"], results["objects"], results["views"]) == ("val", 3, 2)
     table = rows(folder / "per_object.csv")
     assert [(row["category"], row["view"]) for row in table] == list(product(("bottle", "bowl", "mug"), "01"))

@@ -11,6 +11,7 @@ from stereo_occ import __version__
 from stereo_occ.checkpoint import KEY, VERSION, build_task, plain, read_checkpoint
 from stereo_occ.cli import compose_config
 from stereo_occ.config import training_config
+from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.metrics_file import write_json
 from stereo_occ.provenance import environment
@@ -86,7 +87,7 @@ def test_weights_that_do_not_fit(config, change):
     state = dict(task.state_dict())
     checkpoint = {KEY: {"version": VERSION, "config": config}, "global_step": 7, "state_dict": state}
     trained = trained_model(checkpoint, "x.ckpt")
-    assert (trained.step, trained.threshold) == (7, 0.5)
+    assert (trained.step, trained.decision) == (7, Decision(0.5))
     for name, value in trained.model.state_dict().items():
         assert torch.equal(value, task.model.state_dict()[name])
     trained_model(checkpoint | {"state_dict": state | {"auxiliary.head.bias": torch.zeros(1)}}, "x.ckpt")

@@ -17,6 +17,7 @@ from stereo_occ.calibration import Lens, RealCamera, RealPair
 from stereo_occ.checkpoint import plain
 from stereo_occ.cli import compose_config
 from stereo_occ.config import training_config
+from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.crop import Box
 from stereo_occ.models.sampling import project_points, sample_maps
@@ -76,7 +77,7 @@ def training(*overrides):
 
 
 def reconstructor(*overrides):
-    return Reconstructor(training(*overrides), silhouettes, 0.5, "silhouettes")
+    return Reconstructor(training(*overrides), silhouettes, Decision(0.5), "silhouettes")
 
 
 def on_object(*overrides):
