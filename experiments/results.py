@@ -22,7 +22,7 @@ PROJECT = HERE.parent
 #: Pages and the tables in them, each between ``<!-- results:NAME -->`` and ``<!-- results:end -->``.
 PAGES: dict[str, dict[str, Callable[[], str]]] = {
     "README.md": {"trained": tables.trained},
-    "docs/metrics.md": {"floors": tables.floors},
+    "docs/metrics.md": {"decision": tables.decision, "floors": tables.floors},
     "docs/models.md": {"cost": tables.cost, "models": tables.models, "speed": tables.speed},
     "experiments/recipe_10k/README.md": {
         "over_mono": partial(tables.over_mono, RECIPE, "test", ("iou", "iou_unrotated", "handle_recall")),

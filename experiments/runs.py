@@ -28,6 +28,7 @@ RUNS = {
     LONGER / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=20000",
     FREE / "mono_scratch": "experiment=recipe placement=free model=mono_scratch steps=10000",
     FREE / "plane_sweep_stereo_aided": f"experiment=recipe placement=free {AIDED} steps=10000",
+    FREE / "plane_sweep_guided": f"experiment=recipe placement=free {GUIDED} steps=10000",
 }
 MONO = "mono_scratch"
 CATEGORIES = ("mug", "bowl", "bottle")

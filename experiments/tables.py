@@ -211,6 +211,28 @@ def floors() -> str:
     return _markdown(head, rows)
 
 
+def decision() -> str:
+    """One threshold for all pairs against one for each, chosen on validation objects."""
+    rows = []
+    for name, shown in (("recipe", "plane_sweep_guided, 10,000 steps"), ("field", "weights for photographs")):
+        val, real = (load(HERE / "decision" / f"{name}_{where}.json") for where in ("val", "real"))
+        for rule, by_threshold in val.items():
+            threshold = max(by_threshold, key=lambda t: by_threshold[t]["macro"])
+            values = (
+                f"**{of['macro']:.3f}** ({_parts(of)})"
+                for of in (by_threshold[threshold], real[rule][threshold])
+            )
+            rows.append([shown if rule == "fixed" else "", f"`{rule}`", threshold, *values])
+    head = (
+        "",
+        "decision",
+        "threshold",
+        "validation `iou` (mug / bowl / bottle)",
+        "real `iou` (mug / bowl / bottle)",
+    )
+    return _markdown(head, rows)
+
+
 def probes() -> str:
     """How one change moves the first steps."""
     head = ("changed", *(f"`iou` at {step:,}" for step in PROBED), "mug / bowl / bottle, last")
@@ -276,7 +298,7 @@ def _changed(changed: str) -> str:
     return f"`{changed}`" if changed else "nothing"
 
 
-def _parts(row: Mapping[str, str]) -> str:
+def _parts(row: Mapping[str, str | float]) -> str:
     return " / ".join(f"{float(row[category]):.2f}" for category in CATEGORIES)
 
 

@@ -24,7 +24,7 @@ def model_card(
     lines = [
         f"# {name}",
         "",
-        f"`model={config['model']['name']}`, {parameters / 1e6:.1f} M parameters, {size / 1e6:.1f} MB, "
+        f"`model.name={config['model']['name']}`, {parameters / 1e6:.1f} M parameters, {size / 1e6:.1f} MB, "
         f"images of {data['image_side']} pixels, decision threshold {description['threshold']:.2f}{_rule(config)}.",
         "",
         "## Use",

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The weights for photographs: experiment=field, measured on test objects and, where REAL names a folder of them, on
+# The weights for photographs: experiment=field in two halves, measured on test objects and, where REAL names a folder of them, on
 # real ones with their own colours, in such scenes and before two cameras as they are sold. Results go beside this file.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -12,8 +12,14 @@ measure() { # where, overrides
         surface_points=20000 examples=3 trainer.threads=1 hydra.run.dir="$run/${where}_best" progress=false "$@"
 }
 
-.venv/bin/python -m stereo_occ.train experiment=field trainer.threads=1 \
-    validation.interval=1000 validation.views=2 validation.points=8192 hydra.run.dir="$run" progress=false
+learn() { # folder, overrides
+    folder=$1; shift
+    .venv/bin/python -m stereo_occ.train experiment=field steps=8000 trainer.threads=1 validation.interval=1000 \
+        validation.views=2 validation.points=8192 hydra.run.dir="$folder" progress=false "$@"
+}
+
+learn "${run}_first"
+learn "$run" init="${run}_first/best.ckpt" optimizer.lr=5e-4
 measure test
 if [ -n "${REAL:-}" ]; then
     measure real data=meshes data.root="$REAL" data.views=4 texture=own
