@@ -27,6 +27,7 @@ RUNS = {
     RECIPE / "plane_sweep_guided": f"experiment=recipe {GUIDED} steps=10000",
     LONGER / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=20000",
     FREE / "mono_scratch": "experiment=recipe placement=free model=mono_scratch steps=10000",
+    FREE / "stereo": "experiment=recipe placement=free model=stereo steps=10000",
     FREE / "plane_sweep_stereo_aided": f"experiment=recipe placement=free {AIDED} steps=10000",
     FREE / "plane_sweep_guided": f"experiment=recipe placement=free {GUIDED} steps=10000",
 }

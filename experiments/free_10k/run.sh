@@ -9,6 +9,7 @@ learn mono_scratch 10000 placement=free model=mono_scratch
 learn stereo 10000 placement=free model=stereo
 learn plane_sweep_stereo_aided 10000 placement=free model=plane_sweep_stereo auxiliary=mask_depth
 learn plane_sweep_guided 10000 placement=free model=plane_sweep_guided auxiliary=mask_depth
+against stereo_against_mono $family/stereo $family/mono_scratch
 against aided_against_mono $family/plane_sweep_stereo_aided $family/mono_scratch
 against guided_against_mono $family/plane_sweep_guided $family/mono_scratch
 against guided_against_aided $family/plane_sweep_guided $family/plane_sweep_stereo_aided
