@@ -14,7 +14,7 @@ from typing import Any
 import figures
 import numpy as np
 import tables
-from runs import FIELD, FREE, HERE, LONGER, MONO, RECIPE, RUNS, SHORT, load, rows_of
+from runs import FIELD, FREE, HERE, LONGER, MONO, RECIPE, REPEATED, RUNS, SHORT, load, rows_of
 
 from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 
@@ -32,6 +32,10 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
         "reached": partial(tables.reached, FREE),
         "over_mono": partial(tables.over_mono, FREE, "test", ("iou", "handle_recall")),
         "over_mono_real": partial(tables.over_mono, FREE, "real", ("iou",)),
+    },
+    "experiments/seeds_10k/README.md": {
+        "seeds": tables.seeds,
+        "over_mono_seeds": tables.over_mono_seeds,
     },
     "experiments/field/README.md": {"field": tables.field},
     "docs/experiments.md": {
@@ -55,27 +59,40 @@ def summary() -> dict[str, Any]:
         for where in ("test", "real"):
             facts = load(folder / f"{where}.json")
             run["parameters"] = facts["parameters"]
-            run[where] = {"objects": facts["objects"], "metrics": _differences(folder, None, where)}
+            run[where] = {"objects": facts["objects"], "metrics": _differences([folder], [], where)}
             if mono in RUNS and folder != mono:
-                run[where]["over mono_scratch"] = _differences(folder, mono, where)
+                run[where]["over mono_scratch"] = _differences([folder], [mono], where)
         runs[str(folder.relative_to(HERE))] = run
+    runs["seeds"] = {
+        name: {
+            where: {
+                "metrics": _differences(folders, [], where),
+                "over mono_scratch": _differences(folders, REPEATED[MONO], where),
+            }
+            for where in ("test", "real")
+        }
+        for name, folders in REPEATED.items()
+        if name != MONO
+    }
     return runs
 
 
-def _differences(folder: Path, other: Path | None, where: str) -> dict[str, dict[str, list[float | None]]]:
-    """Of each metric ``folder`` less ``other``, or itself, per category and macro: value, low, high."""
-    ours = _by_view(folder / f"{where}_per_object.csv")
-    theirs = None if other is None else _by_view(other / f"{where}_per_object.csv")
+def _differences(
+    ours: list[Path], theirs: list[Path], where: str
+) -> dict[str, dict[str, list[float | None]]]:
+    """Of each metric our runs less theirs, or ours alone, per category and macro: value, low, high."""
+    a_S, b_T = ([_by_view(run / f"{where}_per_object.csv") for run in runs] for runs in (ours, theirs))
     found: dict[str, dict[str, list[float | None]]] = {}
     for metric in WITH_INTERVALS:
-        keys = [key for key, row in ours.items() if row.get(metric)]
+        keys = [key for key, row in a_S[0].items() if row.get(metric)]
         if not keys:
             continue
-        a_1V = np.array([[float(ours[key][metric]) for key in keys]])
-        b_1V = np.zeros_like(a_1V)
-        if theirs is not None:
-            b_1V = np.array([[float(theirs[key][metric]) for key in keys]])
-        differences = paired_bootstrap(a_1V, b_1V, [key[0] for key in keys], [key[1] for key in keys])
+        a_SV, b_TV = (
+            np.array([[float(run[key][metric]) for key in keys] for run in side]) for side in (a_S, b_T)
+        )
+        if not b_T:
+            b_TV = np.zeros((1, len(keys)))
+        differences = paired_bootstrap(a_SV, b_TV, [key[0] for key in keys], [key[1] for key in keys])
         found[metric] = {name: _rounded(difference) for name, difference in differences.items()}
     return found
 

@@ -7,8 +7,8 @@ from typing import Any
 
 HERE = Path(__file__).parent
 FLOORS = HERE / "floors"
-SHORT, RECIPE, LONGER, FREE, FIELD = (
-    HERE / name for name in ("laptop_4k", "recipe_10k", "recipe_20k", "free_10k", "field")
+SHORT, RECIPE, LONGER, FREE, SEEDS, FIELD = (
+    HERE / name for name in ("laptop_4k", "recipe_10k", "recipe_20k", "free_10k", "seeds_10k", "field")
 )
 AID = "auxiliary=mask_depth"
 AIDED = f"model=plane_sweep_stereo {AID}"
@@ -32,6 +32,8 @@ RUNS = {
     FREE / "plane_sweep_guided": f"experiment=recipe placement=free {GUIDED} steps=10000",
 }
 MONO = "mono_scratch"
+#: Runs of the recipe trained again from other seeds: by name, each training of it.
+REPEATED = {name: [RECIPE / name, *(SEEDS / f"{name}_{seed}" for seed in (1,))] for name in (MONO, "stereo")}
 CATEGORIES = ("mug", "bowl", "bottle")
 
 

@@ -11,6 +11,7 @@ from runs import (
     HERE,
     MONO,
     RECIPE,
+    REPEATED,
     RUNS,
     SHORT,
     load,
@@ -153,6 +154,47 @@ def field() -> str:
             [name, _by_category(metrics), ", ".join(errors), "" if handles is None else f"{handles:.2f}"]
         )
     return _markdown(head, rows)
+
+
+def seeds() -> str:
+    """What the recipe reaches from one seed and another."""
+    head = (
+        "model",
+        "seed",
+        "test `iou` (mug / bowl / bottle)",
+        "`iou_unrotated`",
+        "`handle_recall`",
+        "real `iou`",
+    )
+    rows = []
+    for name, folders in REPEATED.items():
+        for seed, folder in enumerate(folders):
+            test, real = (metrics_of(folder, where) for where in ("test", "real"))
+            rows.append(
+                [
+                    f"`{name}`" if seed == 0 else "",
+                    str(seed),
+                    _by_category(test),
+                    f"{test['test/iou_unrotated']:.3f}",
+                    f"{test['test/handle_recall']:.2f}",
+                    f"{real['test/iou']:.3f}",
+                ]
+            )
+    return _markdown(head, rows)
+
+
+def over_mono_seeds() -> str:
+    """What the repeated models have over mono, over objects and seeds."""
+    results = load(HERE / "results.json")["seeds"]
+    rows = []
+    for name in (name for name in REPEATED if name != MONO):
+        for where in ("test", "real"):
+            for metric in ("iou", "iou_unrotated", "handle_recall"):
+                found = results[name][where]["over mono_scratch"].get(metric)
+                if found:
+                    cells = (_interval(found.get(column)) for column in (*CATEGORIES, "macro"))
+                    rows.append([f"`{name}`", where, f"`{metric}`", *cells])
+    return _markdown(("", "objects", "", *CATEGORIES, "macro"), rows)
 
 
 def parts() -> str:
