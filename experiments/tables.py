@@ -134,11 +134,8 @@ def over_mono(family: Path, where: str, metrics: Sequence[str]) -> str:
     for folder in (folder for folder in runs_of(family) if folder.name != MONO):
         differences = results[f"{family.name}/{folder.name}"][where]["over mono_scratch"]
         for metric in metrics:
-            found = differences[metric]
             name = f"`{folder.name}`" if metric == metrics[0] else ""
-            rows.append(
-                [name, f"`{metric}`", *(_interval(found.get(column)) for column in (*CATEGORIES, "macro"))]
-            )
+            rows.append([name, *_intervals(metric, differences[metric])])
     return _markdown(("", "", *CATEGORIES, "macro"), rows)
 
 
@@ -192,8 +189,7 @@ def over_mono_seeds() -> str:
             for metric in ("iou", "iou_unrotated", "handle_recall"):
                 found = results[name][where]["over mono_scratch"].get(metric)
                 if found:
-                    cells = (_interval(found.get(column)) for column in (*CATEGORIES, "macro"))
-                    rows.append([f"`{name}`", where, f"`{metric}`", *cells])
+                    rows.append([f"`{name}`", where, *_intervals(metric, found)])
     return _markdown(("", "objects", "", *CATEGORIES, "macro"), rows)
 
 
@@ -325,6 +321,11 @@ def _curves(path: Path) -> dict[str, dict[int, dict[str, str]]]:
     for row in rows_of(path):
         curves.setdefault(row["changed"], {})[int(row["step"])] = row
     return curves
+
+
+def _intervals(metric: str, found: Mapping[str, Sequence[float]]) -> list[str]:
+    """The metric's name, and its value for each category and macro."""
+    return [f"`{metric}`", *(_interval(found.get(column)) for column in (*CATEGORIES, "macro"))]
 
 
 def _interval(value: Sequence[float] | None) -> str:

@@ -11,6 +11,7 @@ from trimesh import Trimesh
 from stereo_occ.decision import Decision, DecisionRule
 from stereo_occ.meshing import SampledField, sample_field
 from stereo_occ.models.base import OccupancyModel, StereoViews
+from stereo_occ.models.sampling import cell_centers
 
 #: Along each side of the cube, of the points that tell a pair's threshold.
 CELLS = 24
@@ -55,9 +56,8 @@ def threshold_of(decision: Decision, occupancy: Occupancy) -> float:
     """The occupancy probability at the surface of one pair."""
     if decision.rule is DecisionRule.fixed:
         return decision.threshold
-    middles_C = (np.arange(CELLS, dtype=np.float32) + 0.5) / CELLS - 0.5
-    points_N3 = np.stack(np.meshgrid(middles_C, middles_C, middles_C), axis=-1, dtype=np.float32)
-    return float(decision.thresholds(torch.from_numpy(occupancy(points_N3.reshape(-1, 3)))[None]))
+    logits_N = occupancy(cell_centers(CELLS).numpy())
+    return float(decision.thresholds(torch.from_numpy(logits_N)[None]))
 
 
 def sample_cube(occupancy: Occupancy, threshold: float, resolution: int) -> SampledField:

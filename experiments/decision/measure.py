@@ -20,7 +20,7 @@ from stereo_occ.quiet import quiet_libraries
 from stereo_occ.trained import trained_model
 
 HERE = Path(__file__).parent
-CATEGORIES = ("mug", "bowl", "bottle", "macro")
+COLUMNS = {"mug": "iou/mug", "bowl": "iou/bowl", "bottle": "iou/bottle", "macro": "iou"}
 
 
 def measure(checkpoint: str, subset: str, overrides: list[str]) -> dict[str, dict[str, dict[str, float]]]:
@@ -41,8 +41,8 @@ def measure(checkpoint: str, subset: str, overrides: list[str]) -> dict[str, dic
     found: dict[str, dict[str, dict[str, float]]] = {}
     for rule, of_rule in scores.items():
         for threshold in THRESHOLDS.tolist():
-            summary = of_rule.summary(threshold) | {"iou/macro": of_rule.summary(threshold)["iou"]}
-            values = {name: round(summary[f"iou/{name}"], 4) for name in CATEGORIES}
+            summary = of_rule.summary(threshold)
+            values = {name: round(summary[key], 4) for name, key in COLUMNS.items()}
             found.setdefault(rule.value, {})[f"{threshold:.3f}"] = values
     return found
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The weights for photographs: experiment=field in two halves, measured on test objects and, where REAL names a folder of them, on
-# real ones with their own colours, in such scenes and before two cameras as they are sold. Results go beside this file.
+# The weights for photographs: experiment=field in two halves, measured on test objects and, where REAL names a folder of
+# them, on real ones with their own colours, in such scenes and before two cameras as they are sold. Results go beside
+# this file.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 here=experiments/field run=outputs/field

@@ -52,9 +52,8 @@ class PairEvidence(nn.Module):
         samples_VBCN = sample_maps(reduced_VBCHW, points.positions_VBN2)
         place_VB4N = torch.cat([points.offsets_VBN3.mT, points.depths_VBN[:, :, None].log()], dim=2)
         views_VBCN = relu(add_linear(samples_VBCN, self.place.weight, place_VB4N))
-        seen_VB1N = points.visible_VBN[:, :, None].to(samples_VBCN.dtype)
-        count_B1N = seen_VB1N.sum(dim=0)
-        weights_VB1N = seen_VB1N / count_B1N.clamp(min=1)
+        count_B1N = points.visible_VBN.sum(dim=0)[:, None].to(samples_VBCN.dtype)
+        weights_VB1N = points.shares_VBN[:, :, None].to(samples_VBCN.dtype)
         weighted = (view * weight for view, weight in zip(views_VBCN, weights_VB1N, strict=True))
         mean_BCN = reduce(torch.add, weighted)
         left_BCN, right_BCN = samples_VBCN[0], samples_VBCN[-1]

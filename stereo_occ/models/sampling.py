@@ -31,6 +31,11 @@ class Projections:
     offsets_VBN3: Tensor
     depths_VBN: Tensor
 
+    @property
+    def shares_VBN(self) -> Tensor:
+        """What each view counts for in a mean over those that see the point; 0 where none does."""
+        return self.visible_VBN / self.visible_VBN.sum(dim=0).clamp(min=1)
+
 
 def project_points(
     points_BN3: Tensor, K_VB33: Tensor, camera_from_rig_VB44: Tensor, width: int, height: int

@@ -71,8 +71,7 @@ class SeenSurface(nn.Module):
         squashed = (torch.tanh(behind_VBN / scale) for scale in SCALES)
         near_VBN = torch.exp(-(behind_VBN / NEAR).square())
         told_VBNT = torch.relu(self.tell(torch.stack([behind_VBN, *squashed, spreads_VBN, near_VBN], dim=-1)))
-        shares_VBN = points.visible_VBN / points.visible_VBN.sum(dim=0).clamp(min=1)
-        return (told_VBNT * shares_VBN[..., None].to(told_VBNT.dtype)).sum(dim=0)
+        return (told_VBNT * points.shares_VBN[..., None].to(told_VBNT.dtype)).sum(dim=0)
 
 
 def lines_of_sight(maps: CalibratedMaps, depths_K: Tensor) -> Tensor:

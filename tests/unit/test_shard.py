@@ -238,13 +238,13 @@ def test_what_dead_processes_left_is_removed_and_the_rest_kept(tmp_path):
     dead.join()
     here = socket.gethostname()
     ours = partial_path(path, here, os.getpid())
-    left_behind = partial_path(path, here, dead.pid)
+    of_no_process = partial_path(path, here, dead.pid)
     another_machines = partial_path(path, "node7.cluster", dead.pid)
-    for partial in (ours, left_behind, another_machines):
+    for partial in (ours, of_no_process, another_machines):
         partial.write_bytes(b"")
     remove_partial(path.parent.glob(".*.part"))
     assert set(path.parent.iterdir()) == {path, checksum_path(path), ours, another_machines}
-    left_behind.write_bytes(b"")
+    of_no_process.write_bytes(b"")
     write_whole(path, b"again")
     assert set(path.parent.iterdir()) == {path, checksum_path(path), another_machines}
 
