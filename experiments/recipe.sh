@@ -26,8 +26,9 @@ learn() { # name, steps, overrides
     fi
 }
 
-against() { # folder, A, B: what A has over B on test objects; family/name of each
-    .venv/bin/python -m stereo_occ.compare "outputs/$2/test_best" "outputs/$3/test_best" --output "$here/$1"
+against() { # folder, A, B: what A has over B; family/name of each; real if on real objects
+    local where=${4:-test}
+    .venv/bin/python -m stereo_occ.compare "outputs/$2/${where}_best" "outputs/$3/${where}_best" --output "$here/$1"
 }
 
 # What one change does to the plane sweep, on a schedule of `steps` that is validated every `interval`; set both first.

@@ -13,35 +13,63 @@ from typing import Any
 
 import figures
 import numpy as np
-import tables
-from runs import FIELD, FREE, HERE, LONGER, MONO, RECIPE, REPEATED, RUNS, SHORT, load, rows_of
+import run_tables
+import study_tables
+from runs import FIELD, FREE, HERE, LONGER, MONO, RECIPE, REPEATED, RUNS, SHORT, SURFACES, load, rows_of
 
 from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 
 PROJECT = HERE.parent
 #: Pages and the tables in them, each between ``<!-- results:NAME -->`` and ``<!-- results:end -->``.
 PAGES: dict[str, dict[str, Callable[[], str]]] = {
-    "README.md": {"trained": tables.trained},
-    "docs/metrics.md": {"decision": tables.decision, "floors": tables.floors},
-    "docs/models.md": {"cost": tables.cost, "models": tables.models, "speed": tables.speed},
+    "README.md": {"trained": run_tables.trained},
+    "docs/metrics.md": {"decision": study_tables.decision, "floors": study_tables.floors},
+    "docs/models.md": {"cost": study_tables.cost, "models": study_tables.models, "speed": study_tables.speed},
     "experiments/recipe_10k/README.md": {
-        "over_mono": partial(tables.over_mono, RECIPE, "test", ("iou", "iou_unrotated", "handle_recall")),
-        "parts": tables.parts,
+        "over_mono": partial(run_tables.over_mono, RECIPE, "test", ("iou", "iou_unrotated", "handle_recall")),
+        "parts": run_tables.parts,
     },
     "experiments/free_10k/README.md": {
-        "reached": partial(tables.reached, FREE),
-        "over_mono": partial(tables.over_mono, FREE, "test", ("iou", "handle_recall")),
-        "over_mono_real": partial(tables.over_mono, FREE, "real", ("iou",)),
+        "reached": partial(run_tables.reached, FREE),
+        "over_mono": partial(run_tables.over_mono, FREE, "test", ("iou", "handle_recall")),
+        "over_mono_real": partial(run_tables.over_mono, FREE, "real", ("iou",)),
     },
     "experiments/seeds_10k/README.md": {
-        "seeds": tables.seeds,
-        "over_mono_seeds": tables.over_mono_seeds,
+        "seeds": run_tables.seeds,
+        "over_mono_seeds": run_tables.over_mono_seeds,
     },
-    "experiments/field/README.md": {"field": tables.field},
+    "experiments/field/README.md": {
+        "field": run_tables.field,
+        "less_before": partial(
+            run_tables.less,
+            {"real objects, ZED Mini": FIELD / "zed_mini_against_before"},
+            ("iou", "height_error", "width_error"),
+        ),
+    },
+    "experiments/field_surfaces/README.md": {
+        "surfaces": run_tables.surfaces,
+        "less": partial(
+            run_tables.less,
+            {
+                "glossy, plain less matt, plain": SURFACES / "glossy_none-plain_none",
+                "matt, patterned less matt, plain": SURFACES / "plain_procedural-plain_none",
+                "glossy, patterned less glossy, plain": SURFACES / "glossy_procedural-glossy_none",
+            },
+            ("iou", "recall_2_visible"),
+        ),
+    },
+    "experiments/recipe_20k/README.md": {
+        "half": partial(
+            run_tables.less,
+            {"test objects": LONGER / "half_the_schedule", "real objects": LONGER / "half_the_schedule_real"},
+            ("iou",),
+        ),
+        "reached": partial(run_tables.reached, LONGER),
+    },
     "docs/experiments.md": {
-        "probes": tables.probes,
-        "ablation": tables.ablation,
-        "precision": tables.precision,
+        "probes": study_tables.probes,
+        "ablation": study_tables.ablation,
+        "precision": study_tables.precision,
     },
 }
 WITH_INTERVALS = (

@@ -7,8 +7,17 @@ from typing import Any
 
 HERE = Path(__file__).parent
 FLOORS = HERE / "floors"
-SHORT, RECIPE, LONGER, FREE, SEEDS, FIELD = (
-    HERE / name for name in ("laptop_4k", "recipe_10k", "recipe_20k", "free_10k", "seeds_10k", "field")
+SHORT, RECIPE, LONGER, FREE, SEEDS, FIELD, SURFACES = (
+    HERE / name
+    for name in (
+        "laptop_4k",
+        "recipe_10k",
+        "recipe_20k",
+        "free_10k",
+        "seeds_10k",
+        "field",
+        "field_surfaces",
+    )
 )
 AID = "auxiliary=mask_depth"
 AIDED = f"model=plane_sweep_stereo {AID}"

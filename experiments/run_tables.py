@@ -1,0 +1,184 @@
+"""The tables of what trained models reach."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import cells
+from runs import CATEGORIES, FIELD, HERE, MONO, REPEATED, RUNS, SHORT, SURFACES, load, metrics_of, runs_of
+
+#: Where the weights for photographs are measured.
+BEFORE_CAMERAS = {
+    "test": "test objects",
+    "real": "real objects",
+    "zed_mini": "real objects, ZED Mini",
+    "realsense_d435": "real objects, RealSense D435",
+    "photographs": "real objects, ZED Mini, among photographs",
+}
+#: Looks of the objects with which the weights for photographs are measured.
+LOOKS = {
+    "plain_none": "matt, plain",
+    "plain_procedural": "matt, patterned",
+    "glossy_none": "glossy, plain",
+    "glossy_procedural": "glossy, patterned",
+}
+
+
+def trained() -> str:
+    """IoU of each run's best state, with the settings of each row."""
+    head = (
+        "`python -m stereo_occ.train`", "parameters", "test `iou` (mug / bowl / bottle)", "`iou_bbox`",
+        "`iou_unrotated`", "real objects, `iou`",
+    )  # fmt: skip
+    rows = []
+    for folder, settings in RUNS.items():
+        test, real = (load(folder / f"{where}.json") for where in ("test", "real"))
+        metrics = test["metrics"]
+        rows.append(
+            [
+                f"`{settings}`",
+                f"{test['parameters'] / 1e6:.1f} M",
+                cells.iou(metrics),
+                f"{metrics['test/iou_bbox']:.3f}",
+                f"{metrics['test/iou_unrotated']:.3f}",
+                f"{real['metrics']['test/iou']:.3f} ({real['objects']})",
+            ]
+        )
+    return cells.table(head, rows)
+
+
+def reached(family: Path) -> str:
+    """What the runs of a family reach."""
+    head = (
+        "run", "test `iou` (mug / bowl / bottle)", "`iou_bbox`", "`f_score_2`", "`handle_recall`",
+        "real `iou` (mug / bowl / bottle)",
+    )  # fmt: skip
+    rows = []
+    for folder in runs_of(family):
+        test, real = (metrics_of(folder, where) for where in ("test", "real"))
+        values = (f"{test[f'test/{metric}']:.2f}" for metric in ("f_score_2", "handle_recall"))
+        rows.append(
+            [
+                f"`{folder.name}`",
+                cells.iou(test),
+                f"{test['test/iou_bbox']:.3f}",
+                *values,
+                cells.iou(real),
+            ]
+        )
+    return cells.table(head, rows)
+
+
+def over_mono(family: Path, where: str, metrics: Sequence[str]) -> str:
+    """What each run of a family has over its mono on ``test`` or ``real`` objects, with intervals."""
+    results = load(HERE / "results.json")
+    rows = []
+    for folder in (folder for folder in runs_of(family) if folder.name != MONO):
+        differences = results[f"{family.name}/{folder.name}"][where]["over mono_scratch"]
+        for metric in metrics:
+            name = f"`{folder.name}`" if metric == metrics[0] else ""
+            rows.append([name, *cells.intervals(metric, differences[metric])])
+    return cells.table(("", "", *CATEGORIES, "macro"), rows)
+
+
+def surfaces() -> str:
+    """The weights for photographs on the same objects with four looks."""
+    head = ("", "`iou` (mug / bowl / bottle)", "seen surface found", "`height_error`, `width_error`")
+    rows = []
+    for look, name in LOOKS.items():
+        metrics = load(SURFACES / f"{look}.json")["metrics"]
+        rows.append(
+            [name, cells.iou(metrics), f"{metrics['test/recall_2_visible']:.3f}", cells.size(metrics)]
+        )
+    return cells.table(head, rows)
+
+
+def seeds() -> str:
+    """What the recipe reaches from one seed and another."""
+    head = (
+        "model",
+        "seed",
+        "test `iou` (mug / bowl / bottle)",
+        "`iou_unrotated`",
+        "`handle_recall`",
+        "real `iou`",
+    )
+    rows = []
+    for name, folders in REPEATED.items():
+        for seed, folder in enumerate(folders):
+            test, real = (metrics_of(folder, where) for where in ("test", "real"))
+            rows.append(
+                [
+                    f"`{name}`" if seed == 0 else "",
+                    str(seed),
+                    cells.iou(test),
+                    f"{test['test/iou_unrotated']:.3f}",
+                    f"{test['test/handle_recall']:.2f}",
+                    f"{real['test/iou']:.3f}",
+                ]
+            )
+    return cells.table(head, rows)
+
+
+def over_mono_seeds() -> str:
+    """What the repeated models have over mono, over objects and seeds."""
+    results = load(HERE / "results.json")["seeds"]
+    rows = []
+    for name in (name for name in REPEATED if name != MONO):
+        for where in ("test", "real"):
+            for metric in ("iou", "iou_unrotated", "handle_recall"):
+                found = results[name][where]["over mono_scratch"].get(metric)
+                if found:
+                    rows.append([f"`{name}`", where, *cells.intervals(metric, found)])
+    return cells.table(("", "objects", "", *CATEGORIES, "macro"), rows)
+
+
+def parts() -> str:
+    """How much of thin parts, cavities and of both sides of the surface each run finds."""
+    columns = {
+        "handle": "handle_recall",
+        "neck": "neck_recall",
+        "mugs' cavity empty": "cavity_empty/mug",
+        "bowls' cavity empty": "cavity_empty/bowl",
+        "seen surface": "recall_2_visible",
+        "hidden surface": "recall_2_occluded",
+    }
+    rows = []
+    for folder in (folder for folder in RUNS if folder.parent != SHORT):
+        test, real = (metrics_of(folder, where) for where in ("test", "real"))
+        values = (f"{test[f'test/{metric}']:.2f}" for metric in columns.values())
+        sides = (f"{real[f'test/recall_2_{side}']:.2f}" for side in ("visible", "occluded"))
+        rows.append([f"`{folder.relative_to(HERE)}`", *values, " / ".join(sides)])
+    return cells.table(("run", *columns, "real: seen / hidden"), rows)
+
+
+def field() -> str:
+    """The weights for photographs before one camera and another."""
+    head = ("", "`iou` (mug / bowl / bottle)", "`height_error`, `width_error`", "`handle_recall`")
+    rows = []
+    for where, name in BEFORE_CAMERAS.items():
+        metrics = metrics_of(FIELD, where)
+        handles = metrics.get("test/handle_recall")
+        rows.append(
+            [name, cells.iou(metrics), cells.size(metrics), "" if handles is None else f"{handles:.2f}"]
+        )
+    return cells.table(head, rows)
+
+
+def less(folders: Mapping[str, Path], metrics: Sequence[str]) -> str:
+    """What one evaluation has over another, by the names of the rows; lengths are in millimetres."""
+    rows = []
+    for name, folder in folders.items():
+        results = load(folder / "comparison.json")["results"]
+        for metric in metrics:
+            length = metric.endswith("_error")
+            scale, digits = (1000, 0) if length else (1, 3)
+            found = (results[metric].get(place) for place in (*CATEGORIES, "macro"))
+            bounds = (of and [of[bound] * scale for bound in ("difference", "low", "high")] for of in found)
+            rows.append(
+                [
+                    name if metric == metrics[0] else "",
+                    f"`{metric}`" + (", mm" if length else ""),
+                    *(cells.interval(bound, digits) for bound in bounds),
+                ]
+            )
+    return cells.table(("", "", *CATEGORIES, "macro"), rows)
