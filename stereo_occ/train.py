@@ -17,6 +17,7 @@ from stereo_occ.checks import check_training
 from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
 from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.divergence import StopIfDiverged
 from stereo_occ.group import is_first, run_in_processes, started_elsewhere
 from stereo_occ.loggers.board import Board
 from stereo_occ.loggers.build import build_boards
@@ -103,6 +104,7 @@ def build_callbacks(
     """Checkpoints (best and latest), metrics file, pictures, progress bar."""
     validation = typed.validation
     callbacks: list[Callback] = [
+        StopIfDiverged(),
         ModelCheckpoint(
             folder,
             filename="best",

@@ -325,6 +325,29 @@ def test_another_run_in_the_same_folder_is_refused(workshop, run):
     assert (run / "last.ckpt").read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    ("interval", "message"),
+    [
+        (1, "the loss is nan after step 8: the training has diverged; lower"),
+        (100, "is not finite after step 9:"),
+    ],
+)
+def test_a_training_that_diverges_stops_and_keeps_what_was_before(
+    workshop, tmp_path, monkeypatch, interval, message
+):
+    class Poison(Callback):
+        def on_train_batch_end(self, trainer, pl_module, *_):
+            if trainer.global_step == 7:
+                torch.nn.init.constant_(next(pl_module.parameters()), float("nan"))
+
+    build = train_module.build_callbacks
+    monkeypatch.setattr(train_module, "build_callbacks", lambda *args: [*build(*args), Poison()])
+    with pytest.raises(UserError, match=message):
+        workshop.train(tmp_path, f"logger.interval={interval}")
+    assert torch.load(tmp_path / "last.ckpt", weights_only=True)["global_step"] == 6
+    assert all(value.isfinite().all() for value in weights(tmp_path).values())
+
+
 def test_a_damaged_latest_state_is_one_line(workshop, tmp_path):
     (tmp_path / "last.ckpt").write_bytes(b"half of it")
     with pytest.raises(UserError, match=r"last.ckpt: is damaged"):

@@ -199,3 +199,19 @@ def test_guidance_teaches_what_finds_the_object_and_the_logits_what_is_in_the_gr
 
     assert taught(model.guidance(code, points, occupied)) == {"locator", "scout"}
     assert taught(model.decode(code, points).sum()) == {"sweep", "unet"}
+
+
+def test_gradients_in_half_precision_are_nearly_those_in_single_down_to_the_coarsest_level():
+    torch.manual_seed(0)
+    unet = UNet3d([16, 32, 64, 128])
+    volume = torch.randn(4, 16, 16, 16, 16)
+
+    def gradients(half):
+        with torch.autocast("cpu", torch.bfloat16, enabled=half):
+            loss = unet(volume).float().square().mean()
+        return torch.autograd.grad(loss, list(unet.parameters()))
+
+    for name, single, half in zip(
+        dict(unet.named_parameters()), gradients(False), gradients(True), strict=True
+    ):
+        assert torch.cosine_similarity(single.flatten(), half.flatten(), dim=0) > 0.95, name
