@@ -1,7 +1,7 @@
 """Trainings whose numbers have become infinite or NaN stop, and keep no such state."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NoReturn
 
 import torch
 from lightning.pytorch import LightningModule, Trainer
@@ -13,10 +13,13 @@ from stereo_occ.errors import UserError
 
 
 class StopIfDiverged(Callback):
-    """Looks at the loss where it is logged and before a validation, at the weights before they are saved.
+    """Looks at the loss every ``interval`` steps and before a validation, at the weights before they are saved.
 
     With float16 the loss may be infinite until its scale is found, so there the weights alone are looked at.
     """
+
+    def __init__(self, interval: int, validation_interval: int) -> None:
+        self.intervals = interval, validation_interval
 
     def on_train_batch_end(
         self,
@@ -31,8 +34,7 @@ class StopIfDiverged(Callback):
         Raises:
             UserError: it is not finite.
         """
-        step = trainer.global_step
-        if (step % trainer.log_every_n_steps and step % int(trainer.val_check_batch)) or _scales(trainer):
+        if all(trainer.global_step % interval for interval in self.intervals) or _scales(trainer):
             return
         loss = outputs["loss"] if isinstance(outputs, Mapping) else outputs
         if loss is not None and not torch.isfinite(loss).all():
@@ -56,7 +58,7 @@ def _scales(trainer: Trainer) -> bool:
     return isinstance(plugin, MixedPrecision) and plugin.scaler is not None
 
 
-def _stop(trainer: Trainer, what: str) -> None:
+def _stop(trainer: Trainer, what: str) -> NoReturn:
     raise UserError(
         f"{what} after step {trainer.global_step}: the training has diverged; lower optimizer.lr, set "
         "trainer.gradient_clip=1 or, where half precision is at fault, trainer.precision=32-true; "

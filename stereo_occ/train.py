@@ -104,7 +104,7 @@ def build_callbacks(
     """Checkpoints (best and latest), metrics file, pictures, progress bar."""
     validation = typed.validation
     callbacks: list[Callback] = [
-        StopIfDiverged(),
+        StopIfDiverged(typed.logger.interval, validation.interval),
         ModelCheckpoint(
             folder,
             filename="best",
