@@ -116,7 +116,7 @@ class OccupancyTask(lightning.LightningModule):
         self.scores.merge(gathered(self.scores))
         self.threshold.fill_(self.scores.best_threshold())
         self.log("val/loss", self.scores.loss())
-        values = self.scores.summary(float(self.threshold)) | {"iou_at_0.5": self.scores.summary(0.5)["iou"]}
+        values = self.scores.summary(float(self.threshold)) | {"iou_at_0.5": self.scores.iou_at_half()}
         self.log_dict({f"val/{name}": value for name, value in values.items()})
         self.log("val/threshold", self.threshold)
 

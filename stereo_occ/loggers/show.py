@@ -13,7 +13,6 @@ from trimesh import Trimesh
 
 from stereo_occ.data.batch import Batch
 from stereo_occ.data.examples import examples
-from stereo_occ.decision import level_shift
 from stereo_occ.loggers.board import Board
 from stereo_occ.loggers.config import LoggerConfig
 from stereo_occ.loggers.curves import curves_picture
@@ -51,7 +50,7 @@ class Show(Callback):
         self.boards = boards
         self.shown_on = [board for board in boards if board.shows]
         self.settings = {group: settings[group] for group in SETTINGS}
-        self._answers: list[tuple[Tensor, Tensor, Tensor]] = []
+        self._answers: list[tuple[Tensor, Tensor]] = []
         self._truth_shown = False
 
     def on_fit_start(self, trainer: lightning.Trainer, pl_module: LightningModule) -> None:
@@ -68,17 +67,15 @@ class Show(Callback):
         dataloader_idx: int = 0,
     ) -> None:
         occupied_BN = batch.queries["bbox"].occupied_BN[:, :CURVE_POINTS]
-        assert isinstance(pl_module, OccupancyTask)
-        shift_B = level_shift(pl_module.decision.rule, outputs["cube"])
-        self._answers.append((outputs["bbox"][:, :CURVE_POINTS].flatten(), occupied_BN.flatten(), shift_B))
+        self._answers.append((outputs["bbox"][:, :CURVE_POINTS].flatten(), occupied_BN.flatten()))
 
     def on_validation_end(self, trainer: lightning.Trainer, pl_module: LightningModule) -> None:
         assert isinstance(pl_module, OccupancyTask)
-        logits_N, occupied_N, shift_V = (torch.cat(parts).cpu() for parts in zip(*self._answers, strict=True))
+        logits_N, occupied_N = (torch.cat(parts).cpu() for parts in zip(*self._answers, strict=True))
         self._answers.clear()
         if not self.shown_on:
             return
-        step, threshold = trainer.global_step, float(pl_module.decision.shifted(shift_V).mean())
+        step, threshold = trainer.global_step, pl_module.scores.mean_threshold(pl_module.decision)
         for board in self.shown_on:
             board.answers("val/precision_recall", logits_N.sigmoid(), occupied_N, step)
         self._picture("val/curves", curves_picture(logits_N, occupied_N, threshold), step)

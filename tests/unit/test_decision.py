@@ -81,12 +81,17 @@ def test_validation_scores_each_pair_at_its_own_threshold():
     )
     scores = Scores(rule=RELATIVE)
     scores.update(batch, dict.fromkeys(METRICS, logits_BN))
-    for threshold in (0.3, 0.6):
-        thresholds_B1 = Decision(threshold, RELATIVE).thresholds(logits_BN)[:, None]
+
+    def iou(thresholds_B1):
         inside_BN, truth_BN = logits_BN.double().sigmoid() >= thresholds_B1, occupied_BN > 0.5
-        iou_B = (inside_BN & truth_BN).sum(dim=1) / (inside_BN | truth_BN).sum(dim=1)
-        assert scores.summary(threshold)["iou"] == pytest.approx(float(iou_B.mean()))
-    assert len(set(thresholds_B1.flatten().tolist())) == 4
+        return float(((inside_BN & truth_BN).sum(dim=1) / (inside_BN | truth_BN).sum(dim=1)).mean())
+
+    for decision in (Decision(0.3, RELATIVE), Decision(0.6, RELATIVE)):
+        thresholds_B = decision.thresholds(logits_BN)
+        assert scores.summary(decision.threshold)["iou"] == pytest.approx(iou(thresholds_B[:, None]))
+        assert scores.mean_threshold(decision) == pytest.approx(float(thresholds_B.mean()))
+        assert len(set(thresholds_B.tolist())) == 4
+    assert scores.iou_at_half() == pytest.approx(iou(0.5))
 
 
 @pytest.mark.parametrize("sharpness", [2.0, 30.0])
