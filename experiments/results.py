@@ -68,7 +68,7 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
     },
     "docs/experiments.md": {
         "probes": study_tables.probes,
-        "ablation": study_tables.ablation,
+        "ablation": partial(study_tables.changed, HERE / "ablation"),
         "precision": study_tables.precision,
     },
 }

@@ -130,18 +130,18 @@ def probes() -> str:
     return cells.table(head, rows)
 
 
-def ablation() -> str:
-    """What each training aid is worth at the end of a short schedule."""
+def changed(family: Path) -> str:
+    """What one change each does at the end of a short schedule."""
     best = {
-        changed: max(by_step.values(), key=lambda row: float(row["iou"]))
-        for changed, by_step in _curves(HERE / "ablation" / "ablation.csv").items()
+        change: max(by_step.values(), key=lambda row: float(row["iou"]))
+        for change, by_step in _curves(family / f"{family.name}.csv").items()
     }
     rows = []
-    for changed, row in best.items():
+    for change, row in best.items():
         iou = float(row["iou"])
-        against = f"{iou - float(best['']['iou']):+.3f}" if changed else ""
+        against = f"{iou - float(best['']['iou']):+.3f}" if change else ""
         rows.append(
-            [_changed(changed), f"{iou:.3f}", against, cells.parts(row), f"{float(row['iou_bbox']):.3f}"]
+            [_changed(change), f"{iou:.3f}", against, cells.parts(row), f"{float(row['iou_bbox']):.3f}"]
         )
     return cells.table(
         ("changed", "`iou`", "against nothing changed", "mug / bowl / bottle", "`iou_bbox`"), rows
