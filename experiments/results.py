@@ -15,7 +15,21 @@ import figures
 import numpy as np
 import run_tables
 import study_tables
-from runs import FIELD, FREE, HERE, LONGER, MONO, RECIPE, REPEATED, RUNS, SHORT, SURFACES, load, rows_of
+from runs import (
+    DISTANCES,
+    FIELD,
+    FREE,
+    HERE,
+    LONGER,
+    MONO,
+    RECIPE,
+    REPEATED,
+    RUNS,
+    SHORT,
+    SURFACES,
+    load,
+    rows_of,
+)
 
 from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 
@@ -58,6 +72,18 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
             ("iou", "recall_2_visible"),
         ),
     },
+    "experiments/field_distance/README.md": {
+        "distances": run_tables.distances,
+        "wider": partial(
+            run_tables.less,
+            {
+                f"12 cm less 6.3 cm, at {at} m": DISTANCES / f"wider_{at}"
+                for at in ("0.35", "0.5", "0.7", "1.0")
+            },
+            ("iou",),
+        ),
+    },
+    "experiments/image_side/README.md": {"sides": partial(study_tables.changed, HERE / "image_side")},
     "experiments/recipe_20k/README.md": {
         "half": partial(
             run_tables.less,

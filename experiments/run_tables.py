@@ -4,7 +4,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import cells
-from runs import CATEGORIES, FIELD, HERE, MONO, REPEATED, RUNS, SHORT, SURFACES, load, metrics_of, runs_of
+from runs import (
+    CATEGORIES,
+    DISTANCES,
+    FIELD,
+    HERE,
+    MONO,
+    REPEATED,
+    RUNS,
+    SHORT,
+    SURFACES,
+    load,
+    metrics_of,
+    runs_of,
+)
 
 #: Where the weights for photographs are measured.
 BEFORE_CAMERAS = {
@@ -88,6 +101,28 @@ def surfaces() -> str:
         metrics = load(SURFACES / f"{look}.json")["metrics"]
         rows.append(
             [name, cells.iou(metrics), f"{metrics['test/recall_2_visible']:.3f}", cells.size(metrics)]
+        )
+    return cells.table(head, rows)
+
+
+def distances() -> str:
+    """The weights for photographs near and far, with cameras close together and farther apart."""
+    head = (
+        "between the cameras", "to the object", "real `iou` (mug / bowl / bottle)", "seen surface found",
+        "`height_error`, `width_error`",
+    )  # fmt: skip
+    rows = []
+    for path in sorted(DISTANCES.glob("*.json")):
+        baseline, distance = map(float, path.stem.split("_"))
+        metrics = load(path)["metrics"]
+        rows.append(
+            [
+                f"{baseline * 100:.1f} cm",
+                f"{distance * 100:.0f} cm",
+                cells.iou(metrics),
+                f"{metrics['test/recall_2_visible']:.2f}",
+                cells.size(metrics),
+            ]
         )
     return cells.table(head, rows)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 HERE = Path(__file__).parent
 FLOORS = HERE / "floors"
-SHORT, RECIPE, LONGER, FREE, SEEDS, FIELD, SURFACES = (
+SHORT, RECIPE, LONGER, FREE, SEEDS, FIELD, SURFACES, DISTANCES = (
     HERE / name
     for name in (
         "laptop_4k",
@@ -17,6 +17,7 @@ SHORT, RECIPE, LONGER, FREE, SEEDS, FIELD, SURFACES = (
         "seeds_10k",
         "field",
         "field_surfaces",
+        "field_distance",
     )
 )
 AID = "auxiliary=mask_depth"
@@ -34,6 +35,7 @@ RUNS = {
     RECIPE / "plane_sweep_stereo": "experiment=recipe model=plane_sweep_stereo steps=10000",
     RECIPE / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=10000",
     RECIPE / "plane_sweep_guided": f"experiment=recipe {GUIDED} steps=10000",
+    RECIPE / "plane_sweep_guided_left": f"experiment=recipe {GUIDED} model.views=left steps=10000",
     LONGER / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=20000",
     FREE / "mono_scratch": "experiment=recipe placement=free model=mono_scratch steps=10000",
     FREE / "stereo": "experiment=recipe placement=free model=stereo steps=10000",

@@ -9,7 +9,7 @@ from runs import FLOORS, HERE, RECIPE, load, metrics_of, rows_of, runs_of
 BASELINES = ("visual_hull", "sgm", "mean_shape", "nearest_shape", "truth")
 PROBED = (300, 600, 900, 1200, 2100, 3000)  # steps
 FULL = 40_000  # steps
-#: Names of the recipe's runs in the tables of cost and of speed.
+#: Names of the recipe's runs in the tables of cost and of speed, those that are there.
 COSTS = {
     "mono_scratch": ("mono, resnet18", "mono"),
     "plane_sweep_mono_aided": ("plane_sweep_mono", "plane_sweep_mono"),
@@ -43,7 +43,7 @@ def models() -> str:
     )  # fmt: skip
     cost, speed = (load(HERE / "speed" / f"{name}.json") for name in ("model_cost", "training_step"))
     rows = []
-    for folder in runs_of(RECIPE):
+    for folder in (folder for folder in runs_of(RECIPE) if folder.name in COSTS):
         of_cost, of_speed = COSTS[folder.name]
         size = cost[of_cost]
         ms = speed[of_speed]["bf16_ms"]
