@@ -13,8 +13,8 @@ FEW = 2  # cells per side of a volume
 class Conv3d(nn.Conv3d):
     """:class:`torch.nn.Conv3d` 3x3x3 without bias, whose gradients can be relied on in half precision.
 
-    On CPUs with bfloat16 instructions but no matrix unit (AMD Zen 4) oneDNN's weight gradient of two cells per side is
-    read from memory that nothing was written to; so few cells are as fast in float32.
+    On CPUs with bfloat16 instructions but no matrix unit (seen on an AMD EPYC) oneDNN's weight gradient of two cells
+    per side is read from memory that nothing was written to; so few cells are as fast in float32.
     """
 
     def __init__(self, in_channels: int, channels: int, stride: int) -> None:
