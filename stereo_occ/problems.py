@@ -2,8 +2,10 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ from omegaconf import (
     Node,
     OmegaConf,
     StringNode,
+    open_dict,
 )
 from omegaconf.errors import InterpolationKeyError, OmegaConfBaseException
 from yaml import YAMLError
@@ -31,6 +34,9 @@ from stereo_occ.foreign_code import code_named
 from stereo_occ.paths import conf_dir
 
 Check = Callable[[DictConfig], list[str]]
+
+#: From overrides to the configuration, Hydra's own part included; for the same overrides the same object.
+Compositions = Callable[[tuple[str, ...]], DictConfig]
 
 # Hydra itself raises ValueError for a group without a choice: model=null; YAMLError comes from files of one's own.
 COMPOSITION_ERRORS = (HydraException, OmegaConfBaseException, ValueError, YAMLError)
@@ -71,8 +77,9 @@ def find_problems(
     register_schemas()
     with _composing():
         loader = GlobalHydra.instance().config_loader()
+        composed = _compositions(config_name)
         problems, jobs = [], [[f"{SEARCHPATH}=[file://{config_dir.resolve()}]"] if config_dir else []]
-        swept = _swept_by_file(config_name, [*jobs[0], *overrides]) if multirun else []
+        swept = _swept_by_file(composed, [*jobs[0], *overrides]) if multirun else []
         for override in [*overrides, *swept]:
             if override.startswith("~") and not loader.get_group_options(_key(override)):
                 problems.append(f"{override}: a key cannot be removed; give it a value instead")
@@ -92,10 +99,12 @@ def find_problems(
             first = jobs[0]
             jobs = [[*job, choices[0]] for job in jobs] + [[*first, choice] for choice in choices[1:]]
         if config_dir is not None or any(_key(override) == SEARCHPATH for override in overrides):
-            problems += _code_of_files(config_name, jobs[0])
+            problems += _code_of_files(composed, jobs[0])
         unread = tuple(f"{problem.partition('=')[0]}:" for problem in problems)
         for job in jobs:
-            problems += [p for p in _problems_of_job(config_name, job, check) if not p.startswith(unread)]
+            problems += [
+                p for p in _problems_of_job(config_name, composed, job, check) if not p.startswith(unread)
+            ]
         return list(dict.fromkeys(problems))
 
 
@@ -106,20 +115,30 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"did you mean {' or '.join(close)}?" if close else f"known: {', '.join(known)}"
 
 
-def _code_of_files(config_name: str, overrides: list[str]) -> list[str]:
+def _compositions(config_name: str) -> Compositions:
+    """Compositions of a file in ``conf/``, each made once: it takes tenths of a second."""
+
+    @cache
+    def composed(overrides: tuple[str, ...]) -> DictConfig:
+        return compose(config_name, list(overrides), return_hydra_config=True)
+
+    return composed
+
+
+def _code_of_files(composed: Compositions, overrides: list[str]) -> list[str]:
     """What files from elsewhere would run; nothing if they do not compose, which is reported for itself."""
     try:
-        return code_named(compose(config_name, overrides, return_hydra_config=True).hydra)
+        return code_named(composed(tuple(overrides)).hydra)
     except COMPOSITION_ERRORS:
         return []
 
 
-def _swept_by_file(config_name: str, overrides: Sequence[str]) -> list[str]:
+def _swept_by_file(composed: Compositions, overrides: Sequence[str]) -> list[str]:
     """The sweeps of ``hydra.sweeper.params``, as an experiment may have, that the command line does not replace."""
     parser = OverridesParser.create()
     try:
-        first = [_choices(parser.parse_override(override))[0] for override in overrides]
-        params = compose(config_name, first, return_hydra_config=True).hydra.sweeper.get("params") or {}
+        first = tuple(_choices(parser.parse_override(override))[0] for override in overrides)
+        params = composed(first).hydra.sweeper.get("params") or {}
     except (*COMPOSITION_ERRORS, IndexError):
         return []
     given = {_key(override) for override in overrides}
@@ -136,11 +155,15 @@ def _choices(override: Override) -> list[str]:
     return [f"{override.get_key_element()}={value}" for value in override.sweep_string_iterator()]
 
 
-def _problems_of_job(config_name: str, overrides: list[str], check: Check) -> list[str]:
+def _problems_of_job(
+    config_name: str, composed: Compositions, overrides: list[str], check: Check
+) -> list[str]:
     try:
-        cfg = compose(config_name, overrides)
+        cfg = deepcopy(composed(tuple(overrides)))
     except COMPOSITION_ERRORS as error:
         return _problems_one_by_one(config_name, overrides) or [_one_line(error)]
+    with open_dict(cfg):
+        del cfg["hydra"]
     nodes = _nodes(cfg)
     schema = OmegaConf.get_type(cfg)
     assert is_dataclass(schema)
