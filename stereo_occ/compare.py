@@ -18,8 +18,8 @@ from stereo_occ.errors import UserError
 from stereo_occ.evaluation_rows import Evaluations, find_evaluations, read_evaluations
 from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 from stereo_occ.metrics.summary import METRICS
-from stereo_occ.metrics_file import write_json
 from stereo_occ.provenance import environment
+from stereo_occ.writing import write_json
 
 #: What both sides must have been measured with, as named in ``metrics.json``.
 SAME = ("protocol", "subset", "views", "points", "meshes")

@@ -51,11 +51,12 @@ from stereo_occ.measurement import Measurement, MeshSettings, measure
 from stereo_occ.metrics.calibration import expected_calibration_error
 from stereo_occ.metrics.curves import LEVELS
 from stereo_occ.metrics.summary import summarise
-from stereo_occ.metrics_file import training_history, write_json
+from stereo_occ.metrics_file import training_history
 from stereo_occ.predictors import LearnedPredictor, Predictor
 from stereo_occ.provenance import environment
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.trained import trained_model
+from stereo_occ.writing import write_json
 
 logger = logging.getLogger(__name__)
 

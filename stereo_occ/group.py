@@ -12,8 +12,6 @@ from typing import Any, TypeVar
 
 import torch
 import torch.distributed as dist
-from lightning.fabric.plugins.environments.lightning import find_free_network_port
-from lightning.fabric.plugins.environments.slurm import SLURMEnvironment
 from torch.multiprocessing.spawn import ProcessExitedException, spawn
 
 from stereo_occ.errors import UserError
@@ -56,8 +54,13 @@ def is_first() -> bool:
 
 def started_elsewhere() -> bool:
     """Whether something has started all processes of the group, this one among them."""
-    several = os.environ.get("SLURM_NTASKS", "1") != "1"
-    return "LOCAL_RANK" in os.environ or (several and SLURMEnvironment.detect())
+    return "LOCAL_RANK" in os.environ or (os.environ.get("SLURM_NTASKS", "1") != "1" and _is_slurm_task())
+
+
+def _is_slurm_task() -> bool:
+    from lightning.fabric.plugins.environments.slurm import SLURMEnvironment  # as below
+
+    return SLURMEnvironment.detect()
 
 
 def run_in_processes(processes: int, function: Callable[..., object], *arguments: Any) -> None:
@@ -67,6 +70,9 @@ def run_in_processes(processes: int, function: Callable[..., object], *arguments
         UserError: as one of them did.
         SystemExit: with the code of the first that ended otherwise than well.
     """
+    # lightning takes seconds to import, and programs that do not train come here as well
+    from lightning.fabric.plugins.environments.lightning import find_free_network_port
+
     problems = multiprocessing.get_context("spawn").SimpleQueue()
     port = find_free_network_port()
     group = spawn(_member, (processes, port, problems, function, arguments), processes, join=False)

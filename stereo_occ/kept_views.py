@@ -18,10 +18,9 @@ from trimesh import Trimesh
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import Camera, StereoRig
 from stereo_occ.mesh_output import few_faces
-from stereo_occ.metrics_file import write_json
 from stereo_occ.models.base import StereoViews
 from stereo_occ.predictors import ObjectView
-from stereo_occ.writing import whole_file
+from stereo_occ.writing import whole_file, write_json
 
 FOLDER, INDEX = "views", "index.json"
 

@@ -26,7 +26,7 @@ from lightning.pytorch import Callback, LightningModule, Trainer
 
 from stereo_occ.provenance import environment
 from stereo_occ.task import OccupancyTask
-from stereo_occ.writing import whole_file
+from stereo_occ.writing import write_json
 
 
 class WriteMetrics(Callback):
@@ -90,14 +90,3 @@ def without_nan(values: Mapping[str, float]) -> dict[str, Any]:
     """The values with null for those that are not finite, whose names are then listed under ``not_finite``."""
     lost = [name for name, value in values.items() if not math.isfinite(value)]
     return {**values, **dict.fromkeys(lost), **({"not_finite": lost} if lost else {})}
-
-
-def write_json(path: Path, content: Any) -> None:
-    """Write a JSON file whole or not at all.
-
-    Raises:
-        ValueError: a number is NaN or infinite, which JSON does not know.
-    """
-    text = json.dumps(content, indent=2, allow_nan=False) + "\n"
-    with whole_file(path) as file:
-        file.write(text.encode())

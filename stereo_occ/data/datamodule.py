@@ -10,7 +10,7 @@ from stereo_occ.data.augmentation import AugmentationConfig
 from stereo_occ.data.batch import Batch
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.controls import ControlConfig
-from stereo_occ.data.dataset import DealtBatches, EvaluationPairs, ShuffledBatches, TrainingPairs
+from stereo_occ.data.dataset import DealtBatches, EvaluationPairs, ShuffledBatches, TrainingPairs, whole_batch
 from stereo_occ.data.objects import members
 from stereo_occ.data.prepare import PreparedShards, prepare
 from stereo_occ.data.shard import Shard
@@ -147,13 +147,9 @@ class PairsDataModule(lightning.LightningDataModule):
     def _loader(self, dataset: TrainingPairs | EvaluationPairs, **kwargs: Any) -> DataLoader[Batch]:
         return DataLoader(
             dataset,
-            collate_fn=_as_it_is,
+            collate_fn=whole_batch,
             num_workers=self.workers,
             persistent_workers=self.workers > 0,
             multiprocessing_context="spawn" if self.workers else None,
             **kwargs,
         )
-
-
-def _as_it_is(batch: Any) -> Any:
-    return batch

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -235,6 +236,11 @@ class EvaluationPairs(PairsDataset):
             "cube": cube,
             "unposed": LabelledPoints(pose.to_object(bbox.points_N3), bbox.occupied_N),
         }
+
+
+def whole_batch(batch: Any) -> Any:
+    """Collate nothing. It is here and not beside the loaders so that loading processes need not import lightning."""
+    return batch
 
 
 def _float(array: NDArray[np.generic]) -> torch.Tensor:

@@ -8,10 +8,8 @@ from typing import ClassVar
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import interpolate, relu
-from torchvision.models import resnet18
 
 from stereo_occ.errors import UserError
-from stereo_occ.models.pretrained import load_pretrained, named_weights
 from stereo_occ.models.residual import NormActivation, ResidualBlock
 
 RELU = partial(relu, inplace=True)
@@ -110,6 +108,10 @@ class ResNet18(ImageEncoder):
     std_C11: Tensor
 
     def __init__(self, *, stride: int | None, weights: str | None, load_weights: bool) -> None:
+        from torchvision.models import resnet18  # takes seconds, and no other encoder needs it
+
+        from stereo_occ.models.pretrained import load_pretrained, named_weights
+
         super().__init__()
         self.stride = choose_stride("resnet18", stride, (4, 8, 16, 32))
         source = named_weights(weights) if weights else None

@@ -13,10 +13,10 @@ from stereo_occ.cli import compose_config
 from stereo_occ.config import training_config
 from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
-from stereo_occ.metrics_file import write_json
 from stereo_occ.provenance import environment
 from stereo_occ.resume import AtomicCheckpoints, step_to_resume
 from stereo_occ.trained import trained_model
+from stereo_occ.writing import write_json
 
 
 @pytest.fixture(scope="module")

@@ -272,7 +272,7 @@ def test_image_sides_the_encoder_cannot_take_are_refused():
 
 
 def test_weights_are_not_fetched_where_a_state_dict_follows(monkeypatch):
-    monkeypatch.setattr("stereo_occ.models.encoders.load_pretrained", lambda *_: pytest.fail("fetched"))
+    monkeypatch.setattr("stereo_occ.models.pretrained.load_pretrained", lambda *_: pytest.fail("fetched"))
     fresh = build_model(model_config("model=mono"), rig(64), load_weights=False)
     scratch = build(*MONO)
     fresh.load_state_dict(scratch.state_dict())

@@ -7,8 +7,9 @@ from functools import partial
 import pytest
 
 from stereo_occ.data.objects import ObjectSource
-from stereo_occ.metrics_file import without_nan, write_json
+from stereo_occ.metrics_file import without_nan
 from stereo_occ.provenance import commit, environment, split_hash
+from stereo_occ.writing import write_json
 
 
 def sources(*names):
