@@ -249,15 +249,15 @@ def texture(*overrides):
 
 
 def test_meshes_keep_their_own_colours():
+    own = texture()
     for seed in range(20):
-        drawn = draw_finish(texture(), LOOK, True, np.random.default_rng(seed))
+        drawn = draw_finish(own, LOOK, True, np.random.default_rng(seed))
         assert drawn.pattern is Pattern.own
 
 
 def test_every_pattern_is_drawn_at_its_share():
-    drawn = [
-        draw_finish(texture("texture.share=0.5"), LOOK, False, np.random.default_rng(s)) for s in range(300)
-    ]
+    half = texture("texture.share=0.5")
+    drawn = [draw_finish(half, LOOK, False, np.random.default_rng(s)) for s in range(300)]
     patterned = [finish.pattern.name for finish in drawn if finish.pattern is not Pattern.plain]
     assert 0.4 < len(patterned) / 300 < 0.6
     assert set(patterned) == set(PATTERNS)
