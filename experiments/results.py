@@ -93,6 +93,7 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
         "reached": partial(run_tables.reached, LONGER),
     },
     "docs/experiments.md": {
+        "controls": study_tables.controls,
         "probes": study_tables.probes,
         "ablation": partial(study_tables.changed, HERE / "ablation"),
         "precision": study_tables.precision,

@@ -7,6 +7,14 @@ import numpy as np
 from runs import FLOORS, HERE, RECIPE, load, metrics_of, rows_of, runs_of
 
 BASELINES = ("visual_hull", "sgm", "mean_shape", "nearest_shape", "truth")
+CONTROLS = (
+    "none",
+    "calibration_off_0.5",
+    "calibration_off_1",
+    "calibration_off_2",
+    "left_twice",
+    "right_shuffled",
+)
 PROBED = (300, 600, 900, 1200, 2100, 3000)  # steps
 FULL = 40_000  # steps
 #: Names of the recipe's runs in the tables of cost and of speed, those that are there.
@@ -95,6 +103,15 @@ def floors() -> str:
         values = (f"{test[f'test/{column}']:.3f}" for column in columns)
         rows.append([f"`{name}`", cells.iou(test), *values, cells.iou(real)])
     return cells.table(head, rows)
+
+
+def controls() -> str:
+    """What a network makes of pairs from which something is taken that it was trained with."""
+    rows = []
+    for control in CONTROLS:
+        metrics = load(HERE / "controls" / f"{control}.json")["metrics"]
+        rows.append([f"`{control}`", cells.iou(metrics), f"{metrics['test/handle_recall']:.2f}"])
+    return cells.table(("control", "`iou` (mug / bowl / bottle)", "`handle_recall`"), rows)
 
 
 def decision() -> str:

@@ -2,6 +2,8 @@
 
 They are started here, by torchrun, or by Slurm; a process that was started by one of the latter finds its place in the
 environment.
+
+Programs that do not train come here as well; lightning, which takes seconds to import, is imported where it is needed.
 """
 
 import multiprocessing
@@ -58,7 +60,7 @@ def started_elsewhere() -> bool:
 
 
 def _is_slurm_task() -> bool:
-    from lightning.fabric.plugins.environments.slurm import SLURMEnvironment  # as below
+    from lightning.fabric.plugins.environments.slurm import SLURMEnvironment
 
     return SLURMEnvironment.detect()
 
@@ -70,7 +72,6 @@ def run_in_processes(processes: int, function: Callable[..., object], *arguments
         UserError: as one of them did.
         SystemExit: with the code of the first that ended otherwise than well.
     """
-    # lightning takes seconds to import, and programs that do not train come here as well
     from lightning.fabric.plugins.environments.lightning import find_free_network_port
 
     problems = multiprocessing.get_context("spawn").SimpleQueue()
