@@ -17,7 +17,7 @@ $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "stereo_occ: $$($(PYTHON) --version) is too old, need 3.11 or later; set PYTHON=python3.x" >&2; exit 2; }
 	$(PYTHON) -m venv $(VENV)
-	$(RUN)/pip install --quiet --no-compile --no-deps --require-hashes -r requirements.lock
+	$(RUN)/pip install --quiet --no-deps --require-hashes -r requirements.lock
 	$(RUN)/pip install --quiet --no-deps --no-build-isolation -e .
 	@touch $@
 
