@@ -84,6 +84,10 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
         ),
     },
     "experiments/image_side/README.md": {"sides": partial(study_tables.changed, HERE / "image_side")},
+    "experiments/baseline_angle/README.md": {
+        "angles": partial(study_tables.changed, HERE / "baseline_angle")
+    },
+    "experiments/surfaces/README.md": {"trained_surfaces": study_tables.trained_surfaces},
     "experiments/recipe_20k/README.md": {
         "half": partial(
             run_tables.less,

@@ -165,6 +165,23 @@ def changed(family: Path) -> str:
     )
 
 
+def trained_surfaces() -> str:
+    """What surfaces do to the pair's lead over mono, both trained on them."""
+    best = {
+        change: max(float(row["iou"]) for row in by_step.values())
+        for change, by_step in _curves(HERE / "surfaces" / "surfaces.csv").items()
+    }
+    rows = []
+    for shown, override in (
+        ("matt, plain", ""),
+        ("matt, patterned", "texture=procedural"),
+        ("glossy, plain", "material=glossy"),
+    ):
+        pair, one = best[override], best[f"model=mono_scratch {override}".strip()]
+        rows.append([shown, f"{pair:.3f}", f"{one:.3f}", f"{pair - one:+.3f}"])
+    return cells.table(("surfaces", "`plane_sweep_stereo`", "`mono_scratch`", "difference"), rows)
+
+
 def precision() -> str:
     """bfloat16 against float32, seed by seed."""
     best: dict[bool, list[float]] = {False: [], True: []}
