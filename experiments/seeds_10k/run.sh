@@ -8,7 +8,5 @@ source "$(dirname "$0")/../recipe.sh"
 for seed in 1 2; do
     learn mono_scratch_$seed 10000 seed=$seed model=mono_scratch
     learn stereo_$seed 10000 seed=$seed model=stereo
-done
-for seed in 1 2; do
     learn plane_sweep_guided_$seed 10000 seed=$seed model=plane_sweep_guided auxiliary=mask_depth
 done
