@@ -149,10 +149,7 @@ def probes() -> str:
 
 def changed(family: Path) -> str:
     """What one change each does at the end of a short schedule."""
-    best = {
-        change: max(by_step.values(), key=lambda row: float(row["iou"]))
-        for change, by_step in _curves(family / f"{family.name}.csv").items()
-    }
+    best = _best(family)
     rows = []
     for change, row in best.items():
         iou = float(row["iou"])
@@ -167,17 +164,16 @@ def changed(family: Path) -> str:
 
 def trained_surfaces() -> str:
     """What surfaces do to the pair's lead over mono, both trained on them."""
-    best = {
-        change: max(float(row["iou"]) for row in by_step.values())
-        for change, by_step in _curves(HERE / "surfaces" / "surfaces.csv").items()
-    }
+    best = _best(HERE / "surfaces")
     rows = []
     for shown, override in (
         ("matt, plain", ""),
         ("matt, patterned", "texture=procedural"),
         ("glossy, plain", "material=glossy"),
     ):
-        pair, one = best[override], best[f"model=mono_scratch {override}".strip()]
+        pair, one = (
+            float(best[told.strip()]["iou"]) for told in (override, f"model=mono_scratch {override}")
+        )
         rows.append([shown, f"{pair:.3f}", f"{one:.3f}", f"{pair - one:+.3f}"])
     return cells.table(("surfaces", "`plane_sweep_stereo`", "`mono_scratch`", "difference"), rows)
 
@@ -185,8 +181,8 @@ def trained_surfaces() -> str:
 def precision() -> str:
     """bfloat16 against float32, seed by seed."""
     best: dict[bool, list[float]] = {False: [], True: []}
-    for changed, by_step in _curves(HERE / "precision" / "precision.csv").items():
-        best["32-true" in changed].append(max(float(row["iou"]) for row in by_step.values()))
+    for changed, row in _best(HERE / "precision").items():
+        best["32-true" in changed].append(float(row["iou"]))
     rows = []
     for name, values in (
         ("`bf16-mixed`", best[False]),
@@ -205,6 +201,14 @@ def _curves(path: Path) -> dict[str, dict[int, dict[str, str]]]:
     for row in rows_of(path):
         curves.setdefault(row["changed"], {})[int(row["step"])] = row
     return curves
+
+
+def _best(family: Path) -> dict[str, dict[str, str]]:
+    """By what was changed, the best validation of each run of a family."""
+    return {
+        change: max(by_step.values(), key=lambda row: float(row["iou"]))
+        for change, by_step in _curves(family / f"{family.name}.csv").items()
+    }
 
 
 def _changed(changed: str) -> str:
