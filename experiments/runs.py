@@ -45,8 +45,8 @@ RUNS = {
 MONO = "mono_scratch"
 #: Runs of the recipe trained again from other seeds: by name, each training of it.
 REPEATED = {
-    name: [RECIPE / name, *(SEEDS / f"{name}_{seed}" for seed in seeds)]
-    for name, seeds in {MONO: (1,), "stereo": (1,), "plane_sweep_guided": (1, 2)}.items()
+    name: [RECIPE / name, *(SEEDS / f"{name}_{seed}" for seed in (1, 2))]
+    for name in (MONO, "stereo", "plane_sweep_guided")
 }
 CATEGORIES = ("mug", "bowl", "bottle")
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The paper's two models of recipe_10k and the best calibrated one from a second and a third seed; seed 0 is
-# there. Results go beside this file.
+# The paper's two models of recipe_10k and the best calibrated one from a second and a third seed; seed 0 is there.
+# Results go beside this file.
 set -euo pipefail
 family=seeds_10k
 source "$(dirname "$0")/../recipe.sh"
