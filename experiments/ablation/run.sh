@@ -3,7 +3,7 @@
 # schedule of 2,500 steps of the plane sweep; one seed each.
 set -euo pipefail
 family=ablation steps=2500 interval=500
-source "$(dirname "$0")/../recipe.sh"
+source "$(dirname "$0")/../family.sh"
 
 try base
 try auxiliary auxiliary=mask_depth

@@ -3,7 +3,7 @@
 # camera pi/64 to pi/4 off the mid-line; the paper's pi/16 is the base. One seed each.
 set -euo pipefail
 family=baseline_angle steps=2500 interval=500
-source "$(dirname "$0")/../recipe.sh"
+source "$(dirname "$0")/../family.sh"
 
 try base scale.views=40
 for degrees in 2.8125 5.625 22.5 45.0; do

@@ -2,8 +2,8 @@
 # What stereo is for: size and distance unknown (placement=free), mono, the paper's stereo network and the plane sweep with
 # auxiliary tasks, unguided and guided, on a quarter of the paper's schedule. Results go beside this file.
 set -euo pipefail
-family=free_10k
-source "$(dirname "$0")/../recipe.sh"
+family=free_10k interval=1000
+source "$(dirname "$0")/../family.sh"
 
 learn mono_scratch 10000 placement=free model=mono_scratch
 learn stereo 10000 placement=free model=stereo

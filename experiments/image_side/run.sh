@@ -3,7 +3,7 @@
 # pictures of 64 and of 96 pixels. One seed each.
 set -euo pipefail
 family=image_side steps=2500 interval=500
-source "$(dirname "$0")/../recipe.sh"
+source "$(dirname "$0")/../family.sh"
 
 try base model=plane_sweep_guided auxiliary=mask_depth scale.views=40
 try side96 model=plane_sweep_guided auxiliary=mask_depth scale.views=40 scale.image_side=96

@@ -3,7 +3,7 @@
 # schedule of 3,000 steps that may be stopped (Ctrl-C) once it has shown enough. One seed each.
 set -euo pipefail
 family=probes steps=3000 interval=300
-source "$(dirname "$0")/../recipe.sh"
+source "$(dirname "$0")/../family.sh"
 
 try base
 try points points=2048 queries.box=0.3 queries.outside=0.2 queries.surface=0.5

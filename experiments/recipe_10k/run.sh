@@ -3,8 +3,8 @@
 # the guided one, and its twin of one view, with them alone.
 # Results go beside this file.
 set -euo pipefail
-family=recipe_10k
-source "$(dirname "$0")/../recipe.sh"
+family=recipe_10k interval=1000
+source "$(dirname "$0")/../family.sh"
 
 learn mono_scratch 10000 model=mono_scratch
 learn stereo 10000 model=stereo

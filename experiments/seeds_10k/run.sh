@@ -2,8 +2,8 @@
 # The paper's two models of recipe_10k and the best calibrated one from a second and a third seed; seed 0 is there.
 # Results go beside this file.
 set -euo pipefail
-family=seeds_10k
-source "$(dirname "$0")/../recipe.sh"
+family=seeds_10k interval=1000
+source "$(dirname "$0")/../family.sh"
 
 for seed in 1 2; do
     learn mono_scratch_$seed 10000 seed=$seed model=mono_scratch

@@ -4,7 +4,7 @@
 # validated on surfaces like those it saw. One seed each.
 set -euo pipefail
 family=surfaces steps=2500 interval=500
-source "$(dirname "$0")/../recipe.sh"
+source "$(dirname "$0")/../family.sh"
 
 try base scale.views=40
 try plane_sweep_patterned scale.views=40 texture=procedural
