@@ -22,7 +22,7 @@ $(READY): requirements.lock pyproject.toml
 	@touch $@
 
 demo: $(READY) ## a mesh from the example pair with shipped weights; then render, train and evaluate a small model (minutes)
-	@$(RUN)/python -m stereo_occ.reconstruct left=examples/left.png right=examples/right.png calibration=examples/calibration.yaml output=$(DEMO)/mug.glb
+	@$(RUN)/python -m stereo_occ.reconstruct left=examples/left.png right=examples/right.png rig=examples/calibration.yaml output=$(DEMO)/mug.glb
 	@$(RUN)/python -m stereo_occ.train scale=smoke queries=mixed hydra.run.dir=$(DEMO)/train resume=never
 	@$(RUN)/python -m stereo_occ.evaluate checkpoint=$(DEMO)/train/best.ckpt points=20000 views=4 hydra.run.dir=$(DEMO)/evaluation
 	@echo

@@ -6,7 +6,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
-from runs import CATEGORIES, FLOORS, RECIPE, SHORT, load, metrics_of, runs_of
+from runs import CATEGORIES, FLOORS, SHORT, load, metrics_of, runs_of
 
 METRICS = {"iou": "-", "iou_bbox": "--", "iou_unrotated": ":"}
 
@@ -28,11 +28,11 @@ def curves() -> None:
     figure.savefig(SHORT / "curves.png", dpi=110)
 
 
-def recipe_curves() -> None:
-    """Each metric along the training of each model of the recipe, on validation objects, beside two floors."""
+def recipe_curves(family: Path) -> None:
+    """Each metric along the training of each model of a family, on validation objects, beside two floors."""
     figure, axes = plt.subplots(1, len(METRICS), figsize=(11, 3.4), layout="constrained")
     for axis, metric in zip(axes, METRICS, strict=True):
-        for folder in runs_of(RECIPE):
+        for folder in runs_of(family):
             history = load(folder / "training.json")["history"]
             steps = [entry["step"] for entry in history]
             axis.plot(steps, [entry[f"val/{metric}"] for entry in history], label=folder.name)
@@ -44,7 +44,7 @@ def recipe_curves() -> None:
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("macro IoU, validation objects")
     axes[-1].legend(fontsize=7, loc="lower right")
-    figure.savefig(RECIPE / "curves.png", dpi=110)
+    figure.savefig(family / "curves.png", dpi=110)
 
 
 def examples(folder: Path) -> None:

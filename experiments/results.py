@@ -27,6 +27,7 @@ from runs import (
     RUNS,
     SHORT,
     SURFACES,
+    WHOLE,
     load,
     rows_of,
 )
@@ -95,6 +96,20 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
             ("iou",),
         ),
         "reached": partial(run_tables.reached, LONGER),
+    },
+    "experiments/recipe_40k/README.md": {
+        "reached": partial(run_tables.reached, WHOLE),
+        "over_mono": partial(run_tables.over_mono, WHOLE, "test", ("iou", "iou_unrotated", "handle_recall")),
+        "over_mono_real": partial(run_tables.over_mono, WHOLE, "real", ("iou", "iou_unrotated")),
+        "quarter": partial(
+            run_tables.less,
+            {
+                f"`{name}`, {where} objects": WHOLE / f"{name}_against_quarter{suffix}"
+                for name in (MONO, "stereo")
+                for where, suffix in (("test", ""), ("real", "_real"))
+            },
+            ("iou",),
+        ),
     },
     "docs/experiments.md": {
         "controls": study_tables.controls,
@@ -177,7 +192,8 @@ def fill(page: Path, name: str, text: str) -> None:
 def main() -> None:
     (HERE / "results.json").write_text(json.dumps(summary(), indent=1) + "\n")
     figures.curves()
-    figures.recipe_curves()
+    for family in (RECIPE, WHOLE):
+        figures.recipe_curves(family)
     figures.examples(LONGER / "plane_sweep_stereo_aided")
     for page, made in PAGES.items():
         for name, table in made.items():

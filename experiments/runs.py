@@ -7,12 +7,13 @@ from typing import Any
 
 HERE = Path(__file__).parent
 FLOORS = HERE / "floors"
-SHORT, RECIPE, LONGER, FREE, SEEDS, FIELD, SURFACES, DISTANCES = (
+SHORT, RECIPE, LONGER, WHOLE, FREE, SEEDS, FIELD, SURFACES, DISTANCES = (
     HERE / name
     for name in (
         "laptop_4k",
         "recipe_10k",
         "recipe_20k",
+        "recipe_40k",
         "free_10k",
         "seeds_10k",
         "field",
@@ -37,6 +38,8 @@ RUNS = {
     RECIPE / "plane_sweep_guided": f"experiment=recipe {GUIDED} steps=10000",
     RECIPE / "plane_sweep_guided_left": f"experiment=recipe {GUIDED} model.views=left steps=10000",
     LONGER / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=20000",
+    WHOLE / "mono_scratch": "experiment=recipe model=mono_scratch scale.batch_size=8",
+    WHOLE / "stereo": "experiment=recipe model=stereo scale.batch_size=8",
     FREE / "mono_scratch": "experiment=recipe placement=free model=mono_scratch steps=10000",
     FREE / "stereo": "experiment=recipe placement=free model=stereo steps=10000",
     FREE / "plane_sweep_stereo_aided": f"experiment=recipe placement=free {AIDED} steps=10000",

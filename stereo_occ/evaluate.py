@@ -37,6 +37,7 @@ from stereo_occ.checkpoint import KEY, config_of, plain, read_checkpoint
 from stereo_occ.checks import check_evaluation
 from stereo_occ.cli import compose_config, entry_point
 from stereo_occ.config import EvaluateConfig
+from stereo_occ.errors import UserError
 from stereo_occ.evaluation_data import (
     GROUPS,
     evaluated_pairs,
@@ -69,6 +70,10 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     """
     start = time.monotonic()
     quiet_libraries()
+    if any((folder / name).is_file() for name in ("best.ckpt", "last.ckpt")):
+        raise UserError(
+            f"hydra.run.dir={folder}: holds a training, whose metrics.json would be lost; give another folder"
+        )
     settings = own_settings(cfg)
     if settings.trainer.threads:
         torch.set_num_threads(settings.trainer.threads)

@@ -15,16 +15,22 @@ from stereo_occ.model_card import model_card, training_command
 from stereo_occ.onnx_export import export_onnx
 from stereo_occ.packaged import SUFFIX, write_description, write_weights
 from stereo_occ.trained import load_trained
-from stereo_occ.writing import write_whole
+from stereo_occ.writing import in_the_way, write_whole
 
 logger = logging.getLogger(__name__)
 
 
 def check_export(cfg: DictConfig) -> list[str]:
     """Problems of a configuration, its checkpoint unread."""
-    if cfg.output.endswith((SUFFIX, ".json", ".md", ".onnx", "/")):
+    if not Path(cfg.output).name or cfg.output.endswith((SUFFIX, ".json", ".md", ".onnx", "/")):
         return [f"output={cfg.output}: must be a path without a suffix, such as my_weights"]
-    return []
+    read = [(key, Path(cfg[key])) for key in ("checkpoint", "metrics") if cfg[key] is not None]
+    return in_the_way(cfg.output, outputs(cfg.output), read, "weights")
+
+
+def outputs(prefix: str) -> tuple[Path, Path, Path]:
+    """Weights, description and card of ``OUTPUT``, which may hold dots: v1.2 is no suffix."""
+    return Path(prefix + SUFFIX), Path(f"{prefix}.json"), Path(f"{prefix}.md")
 
 
 def export(cfg: DictConfig) -> list[Path]:
@@ -44,8 +50,7 @@ def export(cfg: DictConfig) -> list[Path]:
         "metrics": _metrics(settings.metrics, run),
         "config": checkpoint[KEY]["config"],
     }
-    # OUTPUT may hold dots: v1.2 is no suffix.
-    weights, card = (prefix.with_name(prefix.name + suffix) for suffix in (SUFFIX, ".md"))
+    weights, _, card = outputs(settings.output)
     state = checkpoint["state_dict"]
     state = {name: state[name] for name in state if name == "threshold" or name.startswith("model.")}
     write_weights(weights, description, state, settings.half)

@@ -11,24 +11,22 @@ from PIL import Image
 
 from stereo_occ import __version__
 from stereo_occ.cli import entry_point
-from stereo_occ.errors import UserError
 from stereo_occ.inference_config import Frame, ReconstructConfig
 from stereo_occ.mesh_output import FORMATS, write_mesh
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.reconstructor import Reconstruction, Reconstructor, SurfaceOptions
-from stereo_occ.writing import write_whole
+from stereo_occ.writing import in_the_way, write_whole
 
 logger = logging.getLogger(__name__)
 
 
 def check_reconstruction(cfg: DictConfig) -> list[str]:
     """Problems of a configuration, its files unread."""
-    problems = [
-        f"{key}={cfg[key]}: no such file"
-        for key in ("left", "right", "left_mask", "right_mask")
-        if cfg[key] is not None and not Path(cfg[key]).is_file()
-    ]
-    problems += [f"rig={path}: no such file" for path in calibration_files(cfg) if not Path(path).is_file()]
+    given = [(key, cfg[key]) for key in ("left", "right", "left_mask", "right_mask") if cfg[key] is not None]
+    given += [("rig", path) for path in calibration_files(cfg)]
+    problems = [f"{key}={path}: no such file" for key, path in given if not Path(path).is_file()]
+    if not problems:
+        problems = in_the_way(cfg.output, outputs(cfg), [(key, Path(path)) for key, path in given])
     if Path(cfg.output).suffix.lower() not in FORMATS:
         problems.append(f"output={cfg.output}: must end in one of {', '.join(FORMATS)}")
     if cfg.threshold is not None and not 0 < cfg.threshold < 1:
@@ -42,6 +40,12 @@ def check_reconstruction(cfg: DictConfig) -> list[str]:
     if cfg.threads is not None and cfg.threads < 1:
         problems.append(f"threads={cfg.threads}: must be at least 1")
     return problems
+
+
+def outputs(cfg: DictConfig) -> list[Path]:
+    """The files that come out, first the mesh."""
+    mesh = Path(cfg.output)
+    return [mesh, mesh.with_suffix(".json"), *([preview_path(mesh)] if cfg.preview else [])]
 
 
 def calibration_files(cfg: DictConfig) -> list[str]:
@@ -86,8 +90,6 @@ def reconstruct_pair(cfg: DictConfig) -> Reconstruction:
 def write_result(result: Reconstruction, settings: ReconstructConfig) -> None:
     """The preview and the JSON file first, so that a mesh that is there has both beside it."""
     output = Path(settings.output)
-    if output.is_dir():
-        raise UserError(f"output={output}: is a folder; give a file")
     if settings.preview:
         png = io.BytesIO()
         Image.fromarray(result.preview()).save(png, "PNG")

@@ -3,7 +3,7 @@
 import json
 import os
 import socket
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
@@ -40,6 +40,35 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def in_the_way(
+    output: str, files: Sequence[Path], inputs: Iterable[tuple[str, Path]] = (), kind: str = ""
+) -> list[str]:
+    """Why ``output=`` must not be written: a folder has that name, or a file that would be lost.
+
+    Args:
+        output: as the user gave it.
+        files: that come of it, the main one first.
+        inputs: files that are read, each with its key.
+        kind: what the main file is, where others that are there without it are somebody's own; else these are replaced.
+    """
+    main = files[0]
+    try:
+        for path in files:
+            beside = "" if str(path) == output else f"would write {path}, which "
+            if path.is_dir():
+                return [f"output={output}: {beside}is a folder; give another file"]
+            if not path.exists():
+                continue
+            for key, read in inputs:
+                if read.exists() and path.samefile(read):
+                    return [f"output={output}: would write over {key}={read}; give another file"]
+            if kind and not main.exists():
+                return [f"output={output}: would write over {path}, which is of no {kind}; give another file"]
+    except OSError:  # no way to look at it, nor to write it: whoever writes says so
+        return []
+    return []
 
 
 def remove_partial(files: Iterable[Path]) -> None:

@@ -34,7 +34,7 @@ class EntryPoints:
 
     def __call__(self, program: str, arguments: Sequence[str]) -> Outcome:
         module = import_module(
-            "stereo_occ.render.__main__" if program == "render" else f"stereo_occ.{program}"
+            f"stereo_occ.{program}.__main__" if program in ("render", "report") else f"stereo_occ.{program}"
         )
         before = files(self.folder)
         self.monkeypatch.chdir(self.folder)

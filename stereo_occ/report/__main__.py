@@ -6,13 +6,12 @@ from pathlib import Path
 from omegaconf import DictConfig, ListConfig, OmegaConf
 
 from stereo_occ.cli import entry_point
-from stereo_occ.errors import UserError
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.report.config import ReportConfig
 from stereo_occ.report.content import read_content
 from stereo_occ.report.markdown import write_markdown
 from stereo_occ.report.page import html
-from stereo_occ.writing import write_whole
+from stereo_occ.writing import in_the_way, write_whole
 
 logger = logging.getLogger(__name__)
 
@@ -24,6 +23,8 @@ def check_report(cfg: DictConfig) -> list[str]:
         problems.append("runs=[]: names no folder; give those of evaluations: runs=[DIR,DIR]")
     if Path(cfg.output).suffix != ".html":
         problems.append(f"output={cfg.output}: must end in .html")
+    page = Path(cfg.output)
+    problems += in_the_way(cfg.output, (page, page.with_suffix(".md")), kind="report")
     if cfg.draws < 1:
         problems.append(f"draws={cfg.draws}: must be at least 1")
     return problems
@@ -45,8 +46,6 @@ def report(cfg: DictConfig) -> Path:
     settings = OmegaConf.to_object(cfg)
     assert isinstance(settings, ReportConfig)
     output = Path(settings.output)
-    if output.is_dir():
-        raise UserError(f"output={output}: is a folder; give a file")
     content = read_content(settings, patterns(cfg))
     write_whole(output, html(content).encode())
     write_markdown(content, output.with_suffix(".md"))

@@ -75,8 +75,22 @@ class Payload:
         return (Path.mkdir, (Path("it_ran"),))
 
 
+#: As ``report`` takes them.
+REPORTS = [
+    Case("a page over somebody's notes", r"output=notes\.html: would write over notes\.md, which is of no report",
+         ["output=notes.html"], content("notes.md", "mine")),
+    Case("a folder for a page", r"output=page\.html: is a folder", ["output=page.html"], folder_called("page.html")),
+]  # fmt: skip
+
 #: As ``export`` takes them; ``tiny.ckpt`` is a good one.
 CHECKPOINTS = [
+    Case("no name for weights", r"output=: must be a path without a suffix", ["output="]),
+    Case("a card over somebody's notes", r"output=README: would write over README\.md, which is of no weights",
+         ["output=README"], content("README.md", "mine")),
+    Case("a description over the metrics", r"output=m: would write over metrics=m\.json; give another file",
+         ["output=m", "metrics=m.json"], content("m.json", "{}")),
+    Case("a card that is a folder", r"output=w: would write w\.md, which is a folder", ["output=w"],
+         folder_called("w.md")),
     Case("a missing checkpoint", r"checkpoint=none\.ckpt: no such file, nor the name of shipped weights",
          ["checkpoint=none.ckpt"]),
     Case("a folder for a checkpoint", r"checkpoint=tiny\.ckpt: no such file",

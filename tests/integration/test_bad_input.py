@@ -111,7 +111,20 @@ def test_reconstruct(case, command, checkpoint, trained, monkeypatch):
 def test_export(case, command, checkpoint):
     shutil.copy(checkpoint, command.folder / "tiny.ckpt")
     case.prepare(command.folder)
-    refused(case, command("export", replaced(["checkpoint=tiny.ckpt", "output=w"], case.arguments)))
+    refused(case, command("export", replaced(["checkpoint=tiny.ckpt", "output=out"], case.arguments)))
+
+
+@pytest.mark.parametrize("case", bad_files.REPORTS, ids=name_of)
+def test_report(case, command):
+    case.prepare(command.folder)
+    refused(case, command("report", replaced(["runs=[evaluation]"], case.arguments)))
+
+
+def test_evaluation_into_the_folder_of_a_training(command, checkpoint):
+    (command.folder / "run").mkdir()
+    shutil.copy(checkpoint, command.folder / "run" / "best.ckpt")
+    outcome = command("evaluate", ["checkpoint=run/best.ckpt", "hydra.run.dir=run"])
+    refused(Case("", r"hydra\.run\.dir=.*run: holds a training"), outcome)
 
 
 @pytest.mark.parametrize("case", bad_files.SHARDS, ids=name_of)
@@ -158,7 +171,7 @@ def test_compare(case, command):
         ("reconstruct", PAIR, "rig.yaml", r"rig=rig\.yaml: cannot be read \(Permission denied\)"),
         ("reconstruct", PAIR, "tiny.ckpt", r"checkpoint=tiny\.ckpt: cannot be read \(Permission denied\)"),
         ("reconstruct", [*PAIR, "output=closed/mug.ply"], "closed",
-         r"closed/mug\.ply: Permission denied; choose another folder"),
+         r"output=closed/mug\.json: cannot be written \(Permission denied\)"),
         ("reconstruct", [*PAIR, "left=closed/left.png"], "closed", r"Permission denied; choose another folder"),
         ("export", ["checkpoint=tiny.ckpt", "output=closed/w"], "closed", r"output=closed/w\..*cannot be written"),
         ("render", ["paths.outputs=closed/outputs"], "closed", r"Permission denied; choose another folder"),
