@@ -1,7 +1,7 @@
 """Controls: the same network, data and schedule, with something taken from the second view.
 
 What a network gains from a pair shows only beside a twin that has the same parameters and lacks the pair. A control
-changes every batch alike, of training and of evaluation, whatever the model.
+changes every view in one way for ever, in training and in evaluation, whatever the model and whoever is in its batch.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,6 +30,18 @@ def controlled(config: ControlConfig, batch: Batch) -> Batch:
     return CONTROLS[config.name](batch, config.degrees)
 
 
+def right_item(config: ControlConfig, item: int, objects: int, views: int) -> int:
+    """The item whose right image stands beside the left one of ``item``.
+
+    It is the item itself, but under ``right_shuffled`` the same view of another object, any one as likely. Items are
+    numbered object by object.
+    """
+    if config.name != "right_shuffled":
+        return item
+    distance = int(np.random.default_rng(item).integers(1, objects))
+    return (item + distance * views) % (objects * views)
+
+
 def _none(batch: Batch, _degrees: float) -> Batch:
     return batch
 
@@ -50,13 +62,6 @@ def _left_twice(batch: Batch, _degrees: float) -> Batch:
     return replace(twice, views=replace(views, **cameras))
 
 
-def _right_shuffled(batch: Batch, degrees: float) -> Batch:
-    """The right image of another pair of the batch, a black one if there is no other; the cameras stay."""
-    if len(batch) == 1:
-        return _right_zeroed(batch, degrees)
-    return _with_right_image(batch, lambda _left, right: right.roll(1, dims=0))
-
-
 def _calibration_off(batch: Batch, degrees: float) -> Batch:
     """The right camera said to be turned about its centre, around another axis in each view."""
     extrinsics_B244 = batch.views.camera_from_rig_B244.clone()
@@ -69,7 +74,7 @@ CONTROLS: dict[str, Callable[[Batch, float], Batch]] = {
     "none": _none,
     "right_zeroed": _right_zeroed,
     "left_twice": _left_twice,
-    "right_shuffled": _right_shuffled,
+    "right_shuffled": _none,  # the images are exchanged before: right_item
     "calibration_off": _calibration_off,
 }
 

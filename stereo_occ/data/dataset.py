@@ -1,6 +1,6 @@
 """Map-style data sets over shards; items are asked for and returned as whole batches."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 from zlib import crc32
@@ -13,7 +13,7 @@ from torch.utils.data import Dataset, Sampler
 from stereo_occ.config import QueriesConfig
 from stereo_occ.data.augmentation import AugmentationConfig, augmented
 from stereo_occ.data.batch import Batch, ImageTruth, Queries, ViewId
-from stereo_occ.data.controls import ControlConfig, controlled
+from stereo_occ.data.controls import ControlConfig, controlled, right_item
 from stereo_occ.data.shard import Shard
 from stereo_occ.errors import UserError
 from stereo_occ.models.base import StereoViews
@@ -110,11 +110,22 @@ class DealtBatches(Sampler[list[int]]):
 
 
 class PairsDataset(Dataset[Batch]):
-    """Stereo pairs of some views of some shards, without points: the part that training and evaluation share."""
+    """Stereo pairs of some views of some shards, without points: the part that training and evaluation share.
 
-    def __init__(self, shards: Sequence[Shard], views: Sequence[int]) -> None:
+    Raises:
+        UserError: there is no other object to take right images from, as ``control`` says.
+    """
+
+    def __init__(
+        self, shards: Sequence[Shard], views: Sequence[int], control: ControlConfig | None = None
+    ) -> None:
         self.shards = shards
         self.views = views
+        self.control = control or ControlConfig()
+        if self.control.name == "right_shuffled" and len(shards) < 2:
+            raise UserError(
+                "control=right_shuffled: takes right images from other objects, and there is only one; use right_zeroed"
+            )
 
     def __len__(self) -> int:
         return len(self.shards) * len(self.views)
@@ -127,7 +138,7 @@ class PairsDataset(Dataset[Batch]):
     def batch(self, items: Sequence[int], points: Sequence[dict[str, LabelledPoints]]) -> Batch:
         """Images, cameras and names of ``items`` with their labelled points."""
         located = [self.locate(item) for item in items]
-        rgb_B2HWC = torch.from_numpy(np.stack([shard.rgb(view) for shard, view in located]))
+        rgb_B2HWC = torch.from_numpy(self._pairs_of(Shard.rgb, items))
         rgb_2BCHW = rgb_B2HWC.permute(1, 0, 4, 2, 3).float().div_(255)
         K_B, camera_from_rig_B = zip(*(shard.cameras(view) for shard, view in located), strict=True)
         return Batch(
@@ -146,11 +157,20 @@ class PairsDataset(Dataset[Batch]):
 
     def image_truth(self, items: Sequence[int]) -> ImageTruth:
         """Masks and depths of ``items``."""
-        located = [self.locate(item) for item in items]
         return ImageTruth(
-            _float(np.stack([shard.mask(view) for shard, view in located])).div_(255),
-            _float(np.stack([shard.depth(view) for shard, view in located])),
+            _float(self._pairs_of(Shard.mask, items)).div_(255), _float(self._pairs_of(Shard.depth, items))
         )
+
+    def _pairs_of(
+        self, read: Callable[[Shard, int], NDArray[np.generic]], items: Sequence[int]
+    ) -> NDArray[np.generic]:
+        """What ``read`` gives for the two images of each of ``items``, ``(B, 2, ...)``."""
+        pairs = np.stack([read(*self.locate(item)) for item in items])
+        for place, item in enumerate(items):
+            other = right_item(self.control, item, len(self.shards), len(self.views))
+            if other != item:
+                pairs[place, 1] = read(*self.locate(other))[1]
+        return pairs
 
 
 class TrainingPairs(PairsDataset):
@@ -171,11 +191,10 @@ class TrainingPairs(PairsDataset):
         augmentation: AugmentationConfig | None = None,
         truth: bool = False,
     ) -> None:
-        super().__init__(shards, views)
+        super().__init__(shards, views, control)
         ends = np.rint(np.cumsum([queries.box, queries.outside, queries.surface]) * points).astype(int)
         self.counts = dict(zip(("box", "outside", "surface"), np.diff(ends, prepend=0).tolist(), strict=True))
         self.seed = seed
-        self.control = control or ControlConfig()
         self.augmentation = augmentation or AugmentationConfig()
         self.truth = truth
 
@@ -218,9 +237,8 @@ class EvaluationPairs(PairsDataset):
         points: int,
         control: ControlConfig | None = None,
     ) -> None:
-        super().__init__(shards, views)
+        super().__init__(shards, views, control)
         self.points = points
-        self.control = control or ControlConfig()
 
     def __getitems__(self, items: list[int]) -> Batch:
         return controlled(self.control, self.batch(items, [self._points(item) for item in items]))

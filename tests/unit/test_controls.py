@@ -9,7 +9,7 @@ from rigs import random_pairs
 from scipy.spatial.transform import Rotation
 
 from stereo_occ.data.batch import Batch, Queries, ViewId
-from stereo_occ.data.controls import CONTROLS, ControlConfig, axes_of, controlled
+from stereo_occ.data.controls import CONTROLS, ControlConfig, axes_of, controlled, right_item
 
 
 def batch_of(count, seed=0):
@@ -40,7 +40,6 @@ def centers(views):
         ("none", set()),
         ("right_zeroed", {"right_BCHW"}),
         ("left_twice", {"right_BCHW", "K_B233", "camera_from_rig_B244"}),
-        ("right_shuffled", {"right_BCHW"}),
         ("calibration_off", {"camera_from_rig_B244"}),
     ],
 )
@@ -56,6 +55,7 @@ def test_what_a_control_changes(name, expected):
 
 
 def test_every_control_is_tested():
+    """right_shuffled needs a data set: tests/unit/test_dataset.py."""
     assert set(CONTROLS) == {"none", "right_zeroed", "left_twice", "right_shuffled", "calibration_off"}
     assert ControlConfig() == ControlConfig("none", 0.0)
 
@@ -71,11 +71,20 @@ def test_the_left_view_twice_is_two_equal_views():
     assert torch.equal(views.camera_from_rig_B244[:, 1], views.camera_from_rig_B244[:, 0])
 
 
-def test_shuffled_right_images_are_those_of_other_pairs():
-    batch = batch_of(3)
-    right = seen("right_shuffled", batch).views.right_BCHW
-    assert torch.equal(right, batch.views.right_BCHW[[2, 0, 1]])
-    assert seen("right_shuffled", batch_of(1)).views.right_BCHW.abs().max() == 0
+def test_the_partner_of_an_item_is_another_object_seen_from_the_same_view():
+    objects, views = 5, 4
+    shuffled = ControlConfig("right_shuffled")
+    partners = np.array([right_item(shuffled, item, objects, views) for item in range(objects * views)])
+    assert (partners // views != np.arange(objects * views) // views).all()
+    assert (partners % views == np.arange(objects * views) % views).all()
+    assert [right_item(ControlConfig(), item, objects, views) for item in range(3)] == [0, 1, 2]
+
+
+def test_every_other_object_is_as_likely_a_partner():
+    objects, views = 4, 3000
+    partners = [right_item(ControlConfig("right_shuffled"), item, objects, views) for item in range(views)]
+    shares = np.bincount(np.array(partners) // views, minlength=objects) / views
+    np.testing.assert_allclose(shares, [0, 1 / 3, 1 / 3, 1 / 3], atol=0.03)
 
 
 @pytest.mark.parametrize("degrees", [0.5, 2.0, 90.0])

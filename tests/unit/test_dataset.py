@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from stereo_occ.config import QueriesConfig
 from stereo_occ.data.batch import Batch, map_tensors
+from stereo_occ.data.controls import ControlConfig
 from stereo_occ.data.dataset import DealtBatches, Draw, EvaluationPairs, ShuffledBatches, TrainingPairs
 from stereo_occ.data.examples import examples
 from stereo_occ.data.shard import Shard
@@ -136,6 +137,36 @@ def test_images_and_cameras_are_those_of_the_shard(shards):
     np.testing.assert_allclose(views.camera_from_rig_B244[0], camera_from_rig, atol=1e-6)
     assert views.camera_from_rig_B244[0, 0, 0, 3] == 0  # the origin lies on the optical axis ...
     assert views.camera_from_rig_B244[0, 0, 2, 3] == 1  # ... one metre ahead
+
+
+@pytest.mark.parametrize("batch_size", [1, 2, 9])
+def test_shuffled_right_images_are_another_objects_whoever_is_in_the_batch(shards, batch_size):
+    pairs = TrainingPairs(
+        shards, range(3), BOX_ONLY, 8, seed=0, control=ControlConfig("right_shuffled"), truth=True
+    )
+    for start in range(0, 9, batch_size):
+        batch = pairs.__getitems__([Draw(item, item) for item in range(start, min(start + batch_size, 9))])
+        for place, name in enumerate(batch.ids):
+            own = next(shard for shard in shards if shard.object_id == name.object_id)
+            others = [shard for shard in shards if shard is not own]
+            left, right = (image[place] for image in (batch.views.left_BCHW, batch.views.right_BCHW))
+            source = one_of(others, right, name.view)
+            np.testing.assert_allclose(left.permute(1, 2, 0) * 255, own.rgb(name.view)[0], atol=1e-4)
+            np.testing.assert_allclose(batch.truth.depth_B2HW[place, 0], own.depth(name.view)[0])
+            np.testing.assert_allclose(batch.truth.depth_B2HW[place, 1], source.depth(name.view)[1])
+            np.testing.assert_allclose(batch.views.K_B233[place], own.cameras(name.view)[0], rtol=1e-6)
+
+
+def one_of(shards, image_CHW, view):
+    """The only one of ``shards`` whose right image this is."""
+    pixels_HWC = image_CHW.permute(1, 2, 0).mul(255).round().byte().numpy()
+    (shard,) = [shard for shard in shards if (shard.rgb(view)[1] == pixels_HWC).all()]
+    return shard
+
+
+def test_a_single_object_has_no_other_to_take_right_images_from(shards):
+    with pytest.raises(UserError, match="there is only one; use right_zeroed"):
+        EvaluationPairs(shards[:1], range(3), 8, ControlConfig("right_shuffled"))
 
 
 @pytest.mark.parametrize(
