@@ -30,10 +30,13 @@ def plain(cfg: DictConfig) -> dict[str, Any]:
     return {str(key): value for key, value in container.items()}
 
 
-def build_task(cfg: DictConfig, load_weights: bool = True) -> OccupancyTask:
+def build_task(
+    cfg: DictConfig, load_weights: bool = True, objects: Mapping[str, list[str]] | None = None
+) -> OccupancyTask:
     """A fresh task for a training configuration.
 
     Args:
+        objects: of the training, for its checkpoints; see :func:`~stereo_occ.data.objects.training_objects`.
         load_weights: read pretrained weights where the encoder asks for them; not needed before a checkpoint is loaded.
     """
     from stereo_occ.task import OccupancyTask  # Lightning, which takes seconds that only training needs
@@ -41,11 +44,12 @@ def build_task(cfg: DictConfig, load_weights: bool = True) -> OccupancyTask:
     typed = OmegaConf.to_object(cfg)
     assert isinstance(typed, TrainConfig)
     rig = build_rig(typed.rig, typed.data.image_side)
-    return OccupancyTask(build_model(plain(cfg.model), rig, load_weights), typed, plain(cfg))
+    return OccupancyTask(build_model(plain(cfg.model), rig, load_weights), typed, plain(cfg), objects)
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """The contents of a checkpoint file; ``[KEY]["config"]`` is the training configuration.
+    """The contents of a checkpoint file; ``[KEY]["config"]`` is the training configuration, ``[KEY]["objects"]`` the
+    identities of the training's objects by subset (missing where it was written before these were noted).
 
     Exported weights (``.safetensors``, or the name of some that are shipped) read as the checkpoint that they are of.
 

@@ -40,9 +40,11 @@ from stereo_occ.config import EvaluateConfig
 from stereo_occ.errors import UserError
 from stereo_occ.evaluation_data import (
     GROUPS,
+    check_unseen,
     evaluated_pairs,
     has_other_meshes,
     own_settings,
+    seen_objects,
     split_facts,
     training_pairs,
 )
@@ -85,10 +87,14 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     )
     if settings.control is not None:
         trained.control = settings.control
-    if settings.subset == "auto":
+    asked = settings.subset
+    if asked == "auto":
         settings.subset = "all" if has_other_meshes(cfg, trained) else "test"
     data = evaluated_pairs(cfg, settings, trained)
     dataset = data.evaluation_dataset(settings.subset)
+    assert data.prepared is not None
+    noted = checkpoint[KEY].get("objects") if checkpoint else None
+    check_unseen(asked, data.prepared.sources, seen_objects(cfg, settings, trained, noted))
     facts: dict[str, Any] = {"step": None, "parameters": None, "trained": None}
     predictor: Predictor
     if settings.baseline is not None:
@@ -123,7 +129,6 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     keeper.write_index()
     threshold = round(fmean(result.thresholds), 6)
     metrics = _metrics(result, threshold)
-    assert data.prepared is not None
     skipped = [vars(file) for file in data.prepared.skipped]
     write_csv(folder / "per_object.csv", result.rows)
     if skipped:

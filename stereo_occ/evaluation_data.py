@@ -1,15 +1,16 @@
 """Which objects an evaluation measures, and which ones the measured model was trained on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.checks import check_pairs
 from stereo_occ.config import EvaluateConfig, TrainConfig
+from stereo_occ.data.config import SplitKind
 from stereo_occ.data.datamodule import PairsDataModule
 from stereo_occ.data.dataset import EvaluationPairs
-from stereo_occ.data.objects import list_objects, members
+from stereo_occ.data.objects import ObjectSource, list_objects, members, training_objects
 from stereo_occ.errors import UserError
 from stereo_occ.provenance import split_hash
 
@@ -64,6 +65,45 @@ def training_pairs(
         return EvaluationPairs(shards, views[:count], min(settings.points, typed.data.pool_size))
 
     return pairs
+
+
+def seen_objects(
+    cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig, noted: Mapping[str, list[str]] | None
+) -> Mapping[str, list[str]]:
+    """Identities of the objects of a training: those noted in its checkpoint, else those that its settings give now.
+
+    There are none where these can no longer be listed, or where the subsets share all objects.
+    """
+    if trained.data.split == SplitKind.view:
+        return {}
+    if noted is not None:
+        return noted
+    try:
+        return training_objects(_typed(trained.copy(), cfg), settings.progress)
+    except UserError:
+        return {}
+
+
+def check_unseen(asked: str, evaluated: Sequence[ObjectSource], seen: Mapping[str, list[str]]) -> None:
+    """Refuse to call objects new that a training has learnt from or chosen by.
+
+    Args:
+        asked: the subset, as it was asked for: ``train`` and ``all`` may have any.
+
+    Raises:
+        UserError: the list of objects is no longer the training's, or holds copies of its objects.
+    """
+    if asked in ("train", "all"):
+        return
+    subsets = ("train",) if asked == "val" else ("train", "val")
+    known = {identity for subset in subsets for identity in seen.get(subset, ())}
+    found = ["/".join(source.key) for source in evaluated if source.identity in known]
+    if found:
+        raise UserError(
+            f"subset={asked}: {len(found)} of the {len(evaluated)} objects were in the model's training or validation "
+            f"({found[0]} is one): the data set has changed since, or holds copies; give it as it was, or other "
+            f"objects, or say subset=all to measure these nonetheless"
+        )
 
 
 def split_facts(

@@ -1,5 +1,6 @@
 """Runs that are stopped at any moment and go on as if they had not been."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -8,7 +9,7 @@ from lightning.fabric.plugins import TorchCheckpointIO
 from lightning.pytorch import LightningModule, Trainer
 from lightning.pytorch.callbacks import Checkpoint
 
-from stereo_occ.checkpoint import config_of, plain, read_checkpoint
+from stereo_occ.checkpoint import KEY, config_of, plain, read_checkpoint
 from stereo_occ.errors import UserError
 from stereo_occ.writing import whole_file
 
@@ -84,11 +85,15 @@ class _Noting:
         self.file.flush()
 
 
-def step_to_resume(checkpoint: Path, config: dict[str, Any]) -> int:
-    """The step that ``checkpoint`` was saved at, if it is of the run that ``config`` (plain values) describes.
+def step_to_resume(checkpoint: Path, config: dict[str, Any], objects: Mapping[str, list[str]]) -> int:
+    """The step that ``checkpoint`` was saved at, if it is of the run that is to go on.
+
+    Args:
+        config: of the run, as plain values.
+        objects: of the run, see :func:`~stereo_occ.data.objects.training_objects`.
 
     Raises:
-        UserError: it is damaged, or of a run with other settings.
+        UserError: it is damaged, holds weights alone, or is of a run with other settings or objects.
     """
     try:
         saved = read_checkpoint(checkpoint)
@@ -100,5 +105,16 @@ def step_to_resume(checkpoint: Path, config: dict[str, Any]) -> int:
         raise UserError(
             f"{checkpoint.parent}: holds a run with another {', '.join(changed)}; "
             f"choose another hydra.run.dir, or resume=never to start over"
+        )
+    if saved[KEY].get("objects", objects) != objects:
+        raise UserError(
+            f"{checkpoint.parent}: holds a run with other training or validation objects; bring the files in "
+            f"{config['data'].get('root')} back to what they were, or choose another hydra.run.dir, or resume=never "
+            f"to start over"
+        )
+    if "optimizer_states" not in saved:
+        raise UserError(
+            f"{checkpoint}: holds weights alone and no state to go on from; say resume=never init=FILE to begin with "
+            f"them"
         )
     return int(saved["global_step"])

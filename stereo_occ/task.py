@@ -1,5 +1,6 @@
 """The Lightning module around any occupancy model."""
 
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -28,6 +29,7 @@ class OccupancyTask(lightning.LightningModule):
     Args:
         config: of the training.
         record: the whole configuration as plain values; it goes into every checkpoint.
+        objects: identities of the training's objects by subset; they go there too.
 
     Attributes:
         threshold: of the decision, chosen at each validation, kept in checkpoints.
@@ -39,11 +41,18 @@ class OccupancyTask(lightning.LightningModule):
     threshold: Tensor
     auxiliary: AuxiliaryHeads | None
 
-    def __init__(self, model: OccupancyModel, config: TrainConfig, record: dict[str, Any]) -> None:
+    def __init__(
+        self,
+        model: OccupancyModel,
+        config: TrainConfig,
+        record: dict[str, Any],
+        objects: Mapping[str, list[str]] | None = None,
+    ) -> None:
         super().__init__()
         self.model = model
         self.config = config
         self.record = record
+        self.objects = objects
         self.scores = Scores(rule=config.validation.decision)
         self.register_buffer("threshold", torch.tensor(0.5))
         decay = config.averaging.decay
@@ -127,6 +136,8 @@ class OccupancyTask(lightning.LightningModule):
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         checkpoint[KEY] = {"version": VERSION, "config": self.record}
+        if self.objects is not None:
+            checkpoint[KEY]["objects"] = dict(self.objects)
         if self.average is not None:
             average, weights = self.average.state()
             checkpoint["state_dict"] |= {f"model.{name}": tensor for name, tensor in average.items()}

@@ -17,6 +17,7 @@ from stereo_occ.checks import check_training
 from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
 from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.data.objects import training_objects
 from stereo_occ.divergence import StopIfDiverged
 from stereo_occ.group import is_first, run_in_processes, started_elsewhere
 from stereo_occ.loggers.board import Board
@@ -47,9 +48,10 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
         torch.set_num_threads(typed.trainer.threads)
     latest = folder / "last.ckpt"
     resume = typed.resume is Resume.auto and latest.exists()
-    step = step_to_resume(latest, plain(cfg)) if resume else 0
+    objects = training_objects(typed, typed.progress and is_first())
+    step = step_to_resume(latest, plain(cfg), objects) if resume else 0
     lightning.seed_everything(typed.seed, verbose=False)
-    task = build_task(cfg, load_weights=not resume and typed.init is None)
+    task = build_task(cfg, load_weights=not resume and typed.init is None, objects=objects)
     if typed.init is not None and not resume:
         begin_with(typed.init, task.model, plain(cfg)["model"])
     data = build_data(typed)

@@ -22,7 +22,8 @@ class ObjectSource:
     """One object of a data set and how to build it (picklable, so that any process can).
 
     Attributes:
-        version: differs when a file of the same name holds another mesh.
+        version: differs when a file of the same name holds another mesh; empty for a generated object.
+        seed: of a generated object.
         subset: that the data set itself puts the object in; empty where it says nothing.
     """
 
@@ -31,6 +32,7 @@ class ObjectSource:
     build: Callable[[], Shape]
     version: str = ""
     subset: str = ""
+    seed: int = 0
 
     @property
     def file_name(self) -> str:
@@ -41,6 +43,11 @@ class ObjectSource:
     def key(self) -> tuple[str, str]:
         """Category and id."""
         return self.category, self.object_id
+
+    @property
+    def identity(self) -> str:
+        """The same for one shape in all data sets: what a mesh file holds; seed and name of a generated object."""
+        return self.version or f"{self.seed}/{self.category}/{self.object_id}"
 
 
 @dataclass(frozen=True)
@@ -70,7 +77,10 @@ def list_objects(pairs: PairsConfig, progress: bool) -> Objects:
         return Objects(
             [
                 ObjectSource(
-                    category, f"{category}_{index:04d}", partial(procedural_shape, category, data.seed, index)
+                    category,
+                    f"{category}_{index:04d}",
+                    partial(procedural_shape, category, data.seed, index),
+                    seed=data.seed,
                 )
                 for category in categories
                 for index in range(data.counts[category])
@@ -121,6 +131,19 @@ def members(objects: Sequence[ObjectSource], pairs: PairsConfig, subset: str) ->
     given = {source.key: source.subset for source in objects if source.subset}
     division = split_objects(list(by_key), pairs.data.fractions, pairs.data.seed, given)
     return [by_key[key] for key in division[subset]]
+
+
+def training_objects(pairs: PairsConfig, progress: bool) -> dict[str, list[str]]:
+    """Identities of the objects that a training learns from (``train``) and chooses by (``val``).
+
+    Raises:
+        UserError: as :func:`list_objects` and :func:`members`.
+    """
+    sources = list_objects(pairs, progress).sources
+    return {
+        subset: sorted(source.identity for source in members(sources, pairs, subset))
+        for subset in ("train", "val")
+    }
 
 
 def _listing(data: MeshFilesConfig) -> Listing:

@@ -175,6 +175,72 @@ def test_what_the_checkpoints_data_cannot_give(workshop, run, tmp_path, override
     assert single_line(str(refusal.value))
 
 
+@pytest.fixture(scope="module")
+def own_meshes(workshop, tmp_path_factory):
+    """A folder of four mugs, the command line that asks for it, and a run trained on it."""
+    folder = tmp_path_factory.mktemp("own")
+    for width in (1, 2, 3, 4):
+        mug(folder / "meshes", width)
+    overrides = ["data=meshes", f"data.root={folder / 'meshes'}", "data.pool_size=1000", "categories=mug"]
+    return (
+        folder / "meshes",
+        overrides,
+        workshop.train(folder / "run", *overrides, "logger=none", "data.views=2"),
+    )
+
+
+def mug(root, width):
+    """A file of its own for each width."""
+    (root / "mug" / f"wide_{width}").mkdir(parents=True)
+    trimesh.creation.box(extents=(width, 2, 1)).export(root / "mug" / f"wide_{width}" / "model.obj")
+
+
+def test_objects_of_the_training_are_not_called_new(workshop, own_meshes, tmp_path):
+    """One more mesh, and the data set is divided another way."""
+    root, _, run = own_meshes
+    workshop.evaluate(run / "best.ckpt", tmp_path / "before", "examples=0")
+    grown = shutil.copytree(root, tmp_path / "grown")
+    mug(grown, 5)
+    elsewhere = ["data=meshes", f"data.root={grown}", "data.pool_size=1000", "categories=mug", "examples=0"]
+    refused = (
+        r"subset=auto: 3 of the 5 objects were in the model's training or validation \(mug/wide_\d is one"
+    )
+    with pytest.raises(UserError, match=refused):
+        workshop.evaluate(run / "best.ckpt", tmp_path / "grown_out", *elsewhere)
+    assert not (tmp_path / "grown_out").exists()
+    workshop.evaluate(run / "best.ckpt", tmp_path / "all", *elsewhere, "subset=all")
+    assert len(rows(tmp_path / "all" / "per_object.csv")) == 10
+
+
+def test_a_training_on_other_objects_does_not_go_on(workshop, own_meshes, tmp_path):
+    root, overrides, run = own_meshes
+    kept = {path.name: path.read_bytes() for path in run.iterdir() if path.is_file()}
+    renamed = (root / "mug" / "wide_1").rename(tmp_path / "wide_1")
+    mug(root, 6)
+    try:
+        with pytest.raises(UserError, match=r"holds a run with other training or validation objects"):
+            workshop.train(run, *overrides, "logger=none", "data.views=2", "steps=50")
+    finally:
+        shutil.rmtree(root / "mug" / "wide_6")
+        renamed.rename(root / "mug" / "wide_1")
+    assert {path.name: path.read_bytes() for path in run.iterdir() if path.is_file()} == kept
+
+
+@pytest.mark.parametrize("noted", [True, False])
+def test_another_division_of_generated_objects_makes_none_of_them_new(workshop, run, tmp_path, noted):
+    """Also of a checkpoint that does not note its objects: its settings say them."""
+    checkpoint = read_checkpoint(run / "best.ckpt")
+    if not noted:
+        del checkpoint[KEY]["objects"]
+    torch.save(checkpoint, tmp_path / "best.ckpt")
+    more = ["data=procedural", "data.fractions=[0,0,1]", "data.pool_size=1000", "data.views=2"]
+    with pytest.raises(UserError, match=r"subset=test: 6 of the 9 objects were in the model's training"):
+        workshop.evaluate(tmp_path / "best.ckpt", tmp_path / "out", *more, "subset=test", "examples=0")
+    workshop.evaluate(
+        tmp_path / "best.ckpt", tmp_path / "new", *more, "data.seed=7", "subset=test", "examples=0"
+    )
+
+
 def test_a_folder_without_a_solid(workshop, run, meshes, tmp_path):
     shutil.copytree(meshes / "bottle", tmp_path / "only" / "bottle")
     with pytest.raises(UserError, match=r"no usable object of mug, bowl, bottle; .*inspect"):

@@ -125,14 +125,21 @@ def test_saving_replaces_the_old_checkpoint_or_leaves_it(tmp_path, config, monke
 
 
 def test_a_run_goes_on_only_as_itself(tmp_path, config):
-    path = save(tmp_path / "last.ckpt", config)
-    assert step_to_resume(path, config) == 7
+    objects = {"train": ["0/mug/a"], "val": []}
+    path = save(tmp_path / "last.ckpt", config, optimizer_states=[])
+    assert step_to_resume(path, config, objects) == 7
     longer = config | {"steps": 1000, "progress": True, "workers": 7}
-    assert step_to_resume(path, longer) == 7
+    assert step_to_resume(path, longer, objects) == 7
     with pytest.raises(
         UserError, match=r"holds a run with another model, seed; choose another hydra.run.dir"
     ):
-        step_to_resume(path, config | {"seed": 1, "model": config["model"] | {"width": 9}})
+        step_to_resume(path, config | {"seed": 1, "model": config["model"] | {"width": 9}}, objects)
+
+
+def test_a_run_does_not_go_on_from_weights_alone(tmp_path, config):
+    path = save(tmp_path / "last.ckpt", config)
+    with pytest.raises(UserError, match=r"last.ckpt: holds weights alone.*say resume=never init=FILE"):
+        step_to_resume(path, config, {})
 
 
 def test_json_is_written_whole(tmp_path):
