@@ -23,7 +23,7 @@ from stereo_occ.models.extension import load_extensions
 from stereo_occ.paths import conf_dir
 from stereo_occ.problems import Check, find_problems
 from stereo_occ.run_folder import remove_traces
-from stereo_occ.system_errors import refusal
+from stereo_occ.system_errors import one_line
 
 # With these Hydra shows something and runs no job.
 ONLY_SHOWS = ("help", "hydra_help", "cfg", "info", "shell_completion")
@@ -64,7 +64,7 @@ def entry_point(
                 load_extensions()
                 return task(cfg)
             except Exception as error:
-                problem = _problem(error)
+                problem = one_line(error)
                 remove_traces(Path(HydraConfig.get().runtime.output_dir))
                 if _runs_elsewhere():
                     raise UserError(problem) from error  # Hydra brings it back to the process of the sweep
@@ -98,7 +98,7 @@ def entry_point(
                 with _errors_raised():
                     run_hydra()
             except Exception as error:
-                failures.append(_problem(error))
+                failures.append(one_line(error))
                 _report(failures[-1:])
             if failures:
                 raise SystemExit(2)
@@ -120,14 +120,6 @@ def compose_config(config_name: str, overrides: Sequence[str] = ()) -> DictConfi
     if problems:
         raise UserError("; ".join(problems))
     return composed[0]
-
-
-def _problem(error: Exception) -> str:
-    """The one line on a mistake of the user's or a refusal of the system's; any other error is raised again."""
-    problem = str(error) if isinstance(error, UserError) else refusal(error)
-    if problem is None:
-        raise error
-    return problem
 
 
 def _by_key(argument: str, aliases: Mapping[str, str]) -> str:

@@ -18,7 +18,9 @@ from stereo_occ.errors import UserError
 from stereo_occ.evaluation_rows import Evaluations, find_evaluations, read_evaluations
 from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 from stereo_occ.metrics.summary import METRICS
+from stereo_occ.model_settings import model_settings
 from stereo_occ.provenance import environment
+from stereo_occ.system_errors import one_line
 from stereo_occ.writing import write_json
 
 #: What both sides must have been measured with, as named in ``metrics.json``.
@@ -28,6 +30,11 @@ SAME = ("protocol", "subset", "views", "points", "meshes")
 NOTED = ("split", "commit", "data")
 
 LEVEL = 0.95
+
+#: Of the bootstrap: a gigabyte for a thousand objects.
+MOST_DRAWS = 100_000
+
+RECORD, PLOT = "comparison.json", "comparison.png"
 
 Results = dict[str, dict[str, Difference]]
 
@@ -41,9 +48,12 @@ def compare(
         metrics: those wanted; None is all that both sides have.
 
     Raises:
-        UserError: the sides were not measured on the same objects and views in the same way, or lack a metric.
+        UserError: they were not measured on the same objects and views in the same way, lack a metric, or one side is
+            of several models.
     """
     check_alike(a, b)
+    for side in (a, b):
+        check_seeds(side)
     shared = [name for name in METRICS if name in a.values and name in b.values]
     for name in metrics or ():
         if name not in shared:
@@ -88,25 +98,42 @@ def table(results: Results) -> str:
 
 def check_alike(a: Evaluations, b: Evaluations) -> None:
     """Refuse results that were not measured on the same objects and views in the same way."""
+    first, expected = a.folders[0], a.facts[0]
+    for folder, facts in zip((*a.folders, *b.folders), (*a.facts, *b.facts), strict=True):
+        for key in SAME:
+            if facts[key] != expected[key]:
+                raise UserError(
+                    f"{first} and {folder}: were measured with {key} {expected[key]} and {facts[key]}; evaluate both "
+                    f"in the same way"
+                )
     if set(a.keys) != set(b.keys):
         only_a, only_b = (sorted(set(x.keys) - set(y.keys)) for x, y in ((a, b), (b, a)))
-        first = "/".join(map(str, (only_a or only_b)[0]))
+        one = "/".join(map(str, (only_a or only_b)[0]))
         raise UserError(
             f"{a.name} and {b.name}: {len(only_a)} object-views are only in the first and {len(only_b)} only in the "
-            f"second, such as {first}; evaluate both with the same data, subset and views"
+            f"second, such as {one}; evaluate both with the same data, subset and views"
         )
-    for key in SAME:
-        of_a, of_b = a.facts[0][key], b.facts[0][key]
-        if of_a != of_b:
+
+
+def check_seeds(side: Evaluations) -> None:
+    """Refuse results that are of several models, and no seeds of one."""
+    first = model_settings(side.facts[0])
+    for folder, facts in zip(side.folders, side.facts, strict=True):
+        settings = model_settings(facts)
+        other = [key for key in first | settings if first.get(key) != settings.get(key)]
+        if other:
             raise UserError(
-                f"{a.name} and {b.name}: were measured with {key} {of_a} and {of_b}; evaluate both in the same way"
+                f"{side.name}: {side.folders[0]} and {folder} are no seeds of one model, they differ in {other[0]} "
+                f"({first.get(other[0])} and {settings.get(other[0])}); compare them one by one"
             )
 
 
 def _notes(a: Evaluations, b: Evaluations) -> list[str]:
     facts_a, facts_b = a.facts[0], b.facts[0]
     return [
-        f"{key} differs: {facts_a[key]} | {facts_b[key]}" for key in NOTED if facts_a[key] != facts_b[key]
+        f"{key} differs: {facts_a.get(key)} | {facts_b.get(key)}"
+        for key in NOTED
+        if facts_a.get(key) != facts_b.get(key)
     ]
 
 
@@ -141,19 +168,29 @@ def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     return parsed
 
 
+def _check(asked: argparse.Namespace) -> None:
+    if not 1 <= asked.draws <= MOST_DRAWS:
+        raise UserError(f"--draws {asked.draws}: must be from 1 to {MOST_DRAWS}")
+    if asked.seed < 0:
+        raise UserError(f"--seed {asked.seed}: must not be negative")
+    for name in (RECORD, PLOT):
+        if (asked.output / name).is_dir():
+            raise UserError(
+                f"--output {asked.output}: {name} in it is a folder; give another folder, or move that one"
+            )
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Compare, print the table and write the files."""
     asked = _arguments(arguments)
     try:
-        if asked.draws < 1:
-            raise UserError(f"--draws {asked.draws}: must be at least 1")
+        _check(asked)
         a, b = (read_evaluations(name, find_evaluations(name)) for name in (asked.a, asked.b))
         results = compare(a, b, asked.metrics, asked.draws, asked.seed)
-        asked.output.mkdir(parents=True, exist_ok=True)
-        write_json(asked.output / "comparison.json", _record(a, b, results, asked.draws, asked.seed))
-        forest_plot(results, a.name, b.name, asked.output / "comparison.png")
-    except UserError as error:
-        sys.stderr.write(f"stereo_occ: {error}\n")
+        write_json(asked.output / RECORD, _record(a, b, results, asked.draws, asked.seed))
+        forest_plot(results, a.name, b.name, asked.output / PLOT)
+    except Exception as error:
+        sys.stderr.write(f"stereo_occ: {one_line(error)}\n")
         raise SystemExit(2) from None
     seeds = f"A: {a.name} ({len(a.folders)} seeds)\nB: {b.name} ({len(b.folders)} seeds)"
     notes = "".join(f"note: {note}\n" for note in _notes(a, b))

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from stereo_occ.metrics.statistics import Difference
 from stereo_occ.metrics.summary import METRICS
+from stereo_occ.writing import whole_file
 
 _COLUMNS = 4
 
@@ -18,7 +19,8 @@ def forest_plot(
     results: Mapping[str, Mapping[str, Difference]], name_a: str, name_b: str, path: Path
 ) -> None:
     """Write the figure as PNG."""
-    forest_figure(results, name_a, name_b).savefig(path, dpi=110)
+    with whole_file(path) as file:
+        forest_figure(results, name_a, name_b).savefig(file, dpi=110, format="png")
 
 
 def forest_figure(results: Mapping[str, Mapping[str, Difference]], name_a: str, name_b: str) -> Figure:

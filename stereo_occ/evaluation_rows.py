@@ -1,11 +1,13 @@
 """Evaluations read back from their folders."""
 
 import csv
+import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from glob import glob
 from pathlib import Path
+from types import UnionType
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,19 @@ from numpy.typing import NDArray
 from stereo_occ.errors import UserError
 from stereo_occ.metrics.summary import METRICS, ROW_KEYS
 from stereo_occ.provenance import SCHEMA
+
+#: What is in every ``metrics.json`` of an evaluation, and what may be.
+FORM: dict[str, type | UnionType] = {
+    "subset": str,
+    "protocol": int,
+    "views": int,
+    "points": int,
+    "meshes": dict,
+    "metrics": dict,
+    "predictor": dict | None,
+    "control": dict | None,
+    "split": dict | None,
+}
 
 #: Category, object, view.
 Key = tuple[str, str, int]
@@ -81,32 +96,45 @@ def read_facts(folder: Path) -> dict[str, Any]:
     """What ``metrics.json`` of an evaluation says.
 
     Raises:
-        UserError: there is none, or it is of another version.
+        UserError: there is none, or it is damaged or of another version.
     """
     try:
-        facts: dict[str, Any] = json.loads((folder / "metrics.json").read_text())
-    except (OSError, ValueError) as error:
+        facts: Any = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
         raise UserError(
             f"{folder}: has no readable metrics.json; give the folder of an evaluation"
         ) from error
-    if facts.get("schema") != SCHEMA or "subset" not in facts:
+    if not isinstance(facts, dict) or facts.get("schema") != SCHEMA or "subset" not in facts:
         raise UserError(
             f"{folder}/metrics.json: is no evaluation of form {SCHEMA}; evaluate the checkpoint again"
+        )
+    wrong = [key for key, kind in FORM.items() if not isinstance(facts.get(key), kind)]
+    trained = facts.get("trained")
+    if trained is not None and not (isinstance(trained, dict) and isinstance(trained.get("config"), dict)):
+        wrong.append("trained")
+    if wrong:
+        raise UserError(
+            f"{folder}/metrics.json: is damaged, {wrong[0]} is {facts.get(wrong[0])!r:.60}; evaluate the checkpoint "
+            f"again"
         )
     return facts
 
 
 def _table(folder: Path) -> dict[Key, dict[str, float]]:
+    path = folder / "per_object.csv"
     try:
-        with (folder / "per_object.csv").open(newline="") as file:
-            rows: Sequence[dict[str, str]] = list(csv.DictReader(file))
-        return {
+        text = path.read_bytes().decode()
+        rows = list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
+        table = {
             (row["category"], row["object_id"], int(row["view"])): {
                 name: float(cell) for name, cell in row.items() if name in METRICS and cell
             }
             for row in rows
         }
-    except (OSError, KeyError, ValueError) as error:
+    except (OSError, KeyError, ValueError, TypeError, csv.Error) as error:
         raise UserError(
             f"{folder}: has no per_object.csv with {', '.join(ROW_KEYS)}; evaluate the checkpoint again"
         ) from error
+    if not rows or not text.endswith("\n") or any(None in row.values() for row in rows):
+        raise UserError(f"{path}: is cut off after {len(rows)} rows; evaluate the checkpoint again")
+    return table

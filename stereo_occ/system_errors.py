@@ -4,6 +4,8 @@ import errno
 
 import torch
 
+from stereo_occ.errors import UserError
+
 #: What to do about each refusal that is not a mistake of this program.
 REMEDIES = {
     errno.ENOSPC: "free some disk space",
@@ -36,3 +38,11 @@ def refusal(error: BaseException) -> str | None:
     ):
         return "not enough memory; ask for less (batch_size, views, workers), or close other programs"
     return None
+
+
+def one_line(error: Exception) -> str:
+    """What to say of a mistake of the user's or of what the system refuses; any other error is raised again."""
+    problem = str(error) if isinstance(error, UserError) else refusal(error)
+    if problem is None:
+        raise error
+    return problem

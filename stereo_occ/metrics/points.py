@@ -13,7 +13,7 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 
 from stereo_occ.metrics.calibration import brier, expected_calibration_error, reliability
 from stereo_occ.metrics.regions import REGIONS
-from stereo_occ.metrics.scores import METRICS
+from stereo_occ.metrics.scores import IOU_OF
 from stereo_occ.metrics.volumetric import iou_at_thresholds
 
 #: Of a failed view: binary cross entropy where torch cuts it off.
@@ -28,7 +28,7 @@ def point_metrics(
 ) -> dict[str, float]:
     """IoU and calibration from logits ``(N,)`` and boolean labels ``(N,)`` of ``cube``, ``bbox`` and ``unposed``."""
     values = {
-        metric: _iou(logits[queries], occupied[queries], threshold) for queries, metric in METRICS.items()
+        metric: _iou(logits[queries], occupied[queries], threshold) for queries, metric in IOU_OF.items()
     }
     values["iou_at_0.5"] = _iou(logits["cube"], occupied["cube"], 0.5)
     loss = binary_cross_entropy_with_logits(logits["bbox"], occupied["bbox"].float())

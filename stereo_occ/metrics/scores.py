@@ -12,7 +12,7 @@ from stereo_occ.decision import Decision, DecisionRule, level_shift
 from stereo_occ.metrics.volumetric import best_threshold, category_means, iou_at_thresholds
 
 #: The metric that each set of evaluation points gives.
-METRICS = {"cube": "iou", "bbox": "iou_bbox", "unposed": "iou_unrotated"}
+IOU_OF = {"cube": "iou", "bbox": "iou_bbox", "unposed": "iou_unrotated"}
 
 #: Candidate decision thresholds on the occupancy probability.
 THRESHOLDS = torch.linspace(0.05, 0.95, 37)
@@ -34,7 +34,7 @@ class Scores:
         self.rule = rule
         self._loss: dict[ViewId, Tensor] = {}
         self._shift: dict[ViewId, Tensor] = {}
-        self._iou: dict[str, dict[ViewId, Tensor]] = {name: {} for name in METRICS.values()}
+        self._iou: dict[str, dict[ViewId, Tensor]] = {name: {} for name in IOU_OF.values()}
         self._iou_at_half: dict[ViewId, Tensor] = {}
 
     def update(self, batch: Batch, logits: Mapping[str, Tensor]) -> None:
@@ -45,7 +45,7 @@ class Scores:
         shift_B = level_shift(self.rule, logits["cube"])
         self._shift |= zip(batch.ids, shift_B.cpu(), strict=True)
         inside = {name: queries.occupied_BN > 0.5 for name, queries in batch.queries.items()}
-        for queries, metric in METRICS.items():
+        for queries, metric in IOU_OF.items():
             iou_BT = iou_at_thresholds(logits[queries] - shift_B[:, None], inside[queries], self.thresholds_T)
             self._iou[metric] |= zip(batch.ids, iou_BT.cpu(), strict=True)
         iou_B1 = iou_at_thresholds(logits["cube"], inside["cube"], HALF_1)

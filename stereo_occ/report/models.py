@@ -1,42 +1,23 @@
 """Which evaluations are seeds of one model, and what to call it: from what the files say, not from folders' names."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stereo_occ.checkpoint import plain
-from stereo_occ.compare import SAME, check_alike
-from stereo_occ.config import training_config
+from stereo_occ.compare import check_alike
 from stereo_occ.errors import UserError
 from stereo_occ.evaluation_rows import Evaluations, read_evaluations, read_facts
-from stereo_occ.flat import flat
+from stereo_occ.model_settings import Settings, model_settings
 from stereo_occ.shapes.shape import CATEGORIES
 
-#: Settings of a training that do not make another model, by the start of their dotted name.
-SAME_MODEL = (
-    "seed",
-    "paths.",
-    "workers",
-    "progress",
-    "resume",
-    "logger.",
-    "trainer.accelerator",
-    "trainer.devices",
-    "trainer.threads",
-    "trainer.workers",
-    "validation.checkpoint_interval",
-    "validation.keep_all",
-    "scale.",  # only fills in others
-)
+#: Controls that leave a model two views of one object.
+SHOW_THE_PAIR = {"none", "calibration_off"}
 
 #: How many differing settings a label names.
 MOST_NAMED = 3
-
-Settings = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +81,9 @@ def read_models(folders: Sequence[Path]) -> list[Model]:
         for label, (name, in_group) in zip(labels, groups.items(), strict=True)
     ]
     for model in models:
-        for index, folder in enumerate(model.folders):
-            _check_same(models[0], model, index, folder)
         check_alike(models[0].evaluations, model.evaluations)
+        for facts, folder in zip(model.evaluations.facts, model.folders, strict=True):
+            _check_same_test_set(models[0], facts, folder)
     return models
 
 
@@ -110,23 +91,6 @@ def in_order(categories: Iterable[str]) -> list[str]:
     """Each category once, in the order of the paper."""
     known = {name: index for index, name in enumerate(CATEGORIES)}
     return sorted(set(categories), key=lambda name: (known.get(name, len(known)), name))
-
-
-def model_settings(facts: Mapping[str, Any]) -> Settings:
-    """What makes an evaluated model, by dotted key; seeds of one model have the same."""
-    predictor, trained = facts.get("predictor") or {}, facts.get("trained")
-    if "baseline" in predictor:
-        return flat(predictor["baseline"], "baseline.")
-    control = flat(facts.get("control") or {"name": "none", "degrees": 0.0}, "control.")
-    if trained is None:
-        return {"parameters": facts.get("parameters"), "step": facts.get("step")} | control
-    config = trained["config"]
-    with suppress(UserError):
-        config = plain(training_config(config))  # with the values that newer keys have by default
-    settings = {key: value for key, value in flat(config).items() if not key.startswith(SAME_MODEL)}
-    under = {key: settings.pop(key) for key in list(settings) if key.startswith("control.")}
-    trained_under = {} if under == control else {f"trained_under_{key}": under[key] for key in under}
-    return settings | control | trained_under
 
 
 def labels_of(models: Sequence[Settings]) -> list[str]:
@@ -164,23 +128,17 @@ def _named(key: str, value: Any) -> str:
 
 
 def _uses_pair(settings: Settings) -> bool:
+    controls = {settings.get(name, "none") for name in ("control.name", "trained_under_control.name")}
     return (
         settings.get("model.name", "mono") != "mono"
         and settings.get("model.views") != "left"
-        and settings.get("control.name", "none") == "none"
-        and "trained_under_control.name" not in settings
+        and controls <= SHOW_THE_PAIR
     )
 
 
-def _check_same(first: Model, model: Model, index: int, folder: Path) -> None:
-    """The same test set: objects that were split alike, from renders of one configuration."""
-    facts, expected = model.evaluations.facts[index], first.facts
-    for key in SAME:
-        if facts[key] != expected[key]:
-            raise UserError(
-                f"runs: {first.folders[0]} and {folder} were measured with {key} {expected[key]} and {facts[key]}; "
-                f"evaluate both in the same way"
-            )
+def _check_same_test_set(first: Model, facts: Mapping[str, Any], folder: Path) -> None:
+    """The same objects, split alike, from renders of one configuration."""
+    expected = first.facts
     splits = [(of.get("split") or {}).get("hash") for of in (expected, facts)]
     data = [Path(str(of.get("data"))).name for of in (expected, facts)]
     if None not in splits and splits[0] != splits[1]:

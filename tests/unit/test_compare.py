@@ -18,6 +18,7 @@ FACTS = {
     "views": 2,
     "points": 100,
     "meshes": {"views": 0},
+    "metrics": {},
 }
 FACTS |= {"split": {"hash": "a"}, "commit": None, "data": "x"}
 
@@ -118,6 +119,105 @@ def test_what_cannot_be_compared_is_one_line(tmp_path, capsys, facts, complaint)
     assert complaint in message
     assert single_line(message.rstrip("\n").replace(str(tmp_path), ""))
     assert not (tmp_path / "out").exists()
+
+
+def test_all_folders_of_both_sides_are_checked(tmp_path, capsys):
+    a = evaluation(tmp_path / "a", hard)
+    evaluation(tmp_path / "b_1", hard)
+    other = evaluation(tmp_path / "b_2", hard, points=200)
+    message = refusal(capsys, a, tmp_path / "b_*", "--output", tmp_path / "out")
+    assert f"{a} and {other}: were measured with points 100 and 200" in message
+
+
+@pytest.mark.parametrize(
+    ("of_second", "difference"),
+    [
+        ({"trained": {"config": {"seed": 1, "model": {"name": "stereo"}}}}, None),
+        ({"trained": {"config": {"seed": 0, "model": {"name": "mono"}}}}, "model.name (stereo and mono)"),
+        ({"control": {"name": "left_twice", "degrees": 0.0}}, "control.name (none and left_twice)"),
+    ],
+)
+def test_the_folders_of_one_side_are_seeds_of_one_model(tmp_path, capsys, of_second, difference):
+    a = evaluation(tmp_path / "a", hard)
+    trained = {"config": {"seed": 0, "model": {"name": "stereo"}}}
+    evaluation(tmp_path / "b_1", hard, trained=trained)
+    evaluation(tmp_path / "b_2", hard, **({"trained": trained} | of_second))
+    if difference is None:
+        run(tmp_path, capsys, a, tmp_path / "b_*")
+    else:
+        message = refusal(capsys, a, tmp_path / "b_*", "--output", tmp_path / "out")
+        assert (
+            f"b_2 are no seeds of one model, they differ in {difference}; compare them one by one" in message
+        )
+        assert not (tmp_path / "out").exists()
+
+
+def append(path, content):
+    path.write_bytes(path.read_bytes() + content)
+
+
+def cut(path, size):
+    path.write_bytes(path.read_bytes()[:size])
+
+
+@pytest.mark.parametrize(
+    ("damage", "complaint"),
+    [
+        (lambda folder: cut(folder / "per_object.csv", -5), "per_object.csv: is cut off after 24 rows"),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_7"),
+            "has no per_object.csv with category, object_id, view",
+        ),
+        (lambda folder: cut(folder / "per_object.csv", 60), "per_object.csv: is cut off after 0 rows"),
+        (
+            lambda folder: (folder / "per_object.csv").write_bytes(b"category,\xff\n"),
+            "has no per_object.csv with",
+        ),
+        (lambda folder: (folder / "per_object.csv").unlink(), "has no per_object.csv with"),
+        (lambda folder: cut(folder / "metrics.json", 30), "has no readable metrics.json"),
+        (lambda folder: (folder / "metrics.json").write_text("[1]"), "is no evaluation of form 2"),
+        (lambda folder: damage_facts(folder, points=None), "metrics.json: is damaged, points is None"),
+        (lambda folder: damage_facts(folder, trained=3), "metrics.json: is damaged, trained is 3"),
+        (lambda folder: damage_facts(folder, trained={"config": []}), "metrics.json: is damaged, trained is"),
+        (lambda folder: damage_facts(folder, metrics=[0.5]), "metrics.json: is damaged, metrics is [0.5]"),
+    ],
+)
+def test_a_damaged_evaluation_is_one_line(tmp_path, capsys, damage, complaint):
+    a, b = evaluation(tmp_path / "a", hard), evaluation(tmp_path / "b", hard)
+    damage(b)
+    message = refusal(capsys, a, b, "--output", tmp_path / "out")
+    assert complaint in message
+    assert single_line(message.rstrip("\n").replace(str(tmp_path), ""))
+    assert not (tmp_path / "out").exists()
+
+
+def damage_facts(folder, **facts):
+    (folder / "metrics.json").write_text(json.dumps(FACTS | facts))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("--draws", 0), "--draws 0: must be from 1 to 100000"),
+        (("--draws", 10**11), "--draws 100000000000: must be from 1 to 100000"),
+        (("--seed", -1), "--seed -1: must not be negative"),
+    ],
+)
+def test_impossible_draws(tmp_path, capsys, arguments, complaint):
+    a = evaluation(tmp_path / "a", hard)
+    assert complaint in refusal(capsys, a, a, "--output", tmp_path / "out", *arguments)
+
+
+def test_nothing_is_written_where_not_all_can_be(tmp_path, capsys):
+    a = evaluation(tmp_path / "a", hard)
+    (tmp_path / "out" / "comparison.png").mkdir(parents=True)
+    assert "comparison.png in it is a folder" in refusal(capsys, a, a, "--output", tmp_path / "out")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["comparison.png"]
+    (tmp_path / "file").touch()
+    message = refusal(capsys, a, a, "--output", tmp_path / "file")
+    assert (
+        "Not a directory; choose another folder" in message or "File exists; choose another folder" in message
+    )
 
 
 def test_folders_that_are_not_there(tmp_path, capsys):

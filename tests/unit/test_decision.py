@@ -9,7 +9,7 @@ import torch
 
 from stereo_occ.data.batch import Batch, Queries, ViewId
 from stereo_occ.decision import LEAST, Decision, DecisionRule, highest_expected_iou, level_shift
-from stereo_occ.metrics.scores import METRICS, Scores
+from stereo_occ.metrics.scores import IOU_OF, Scores
 from stereo_occ.models.base import StereoViews
 from stereo_occ.reconstruction import threshold_of
 
@@ -76,11 +76,11 @@ def test_validation_scores_each_pair_at_its_own_threshold():
     empty = torch.zeros(4, 0)
     batch = Batch(
         StereoViews(empty, empty, empty, empty),
-        dict.fromkeys(METRICS, Queries(torch.zeros(4, 300, 3), occupied_BN)),
+        dict.fromkeys(IOU_OF, Queries(torch.zeros(4, 300, 3), occupied_BN)),
         [ViewId("mug", "a", view) for view in range(4)],
     )
     scores = Scores(rule=RELATIVE)
-    scores.update(batch, dict.fromkeys(METRICS, logits_BN))
+    scores.update(batch, dict.fromkeys(IOU_OF, logits_BN))
 
     def iou(thresholds_B1):
         inside_BN, truth_BN = logits_BN.double().sigmoid() >= thresholds_B1, occupied_BN > 0.5

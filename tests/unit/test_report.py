@@ -87,6 +87,23 @@ def test_a_network_trained_under_a_control_is_another_model():
     )
 
 
+@pytest.mark.parametrize(
+    ("trained_under", "seen", "pair"),
+    [
+        ("none", "none", True),
+        ("none", "calibration_off", True),
+        ("calibration_off", "calibration_off", True),
+        ("left_twice", "none", False),
+        ("none", "right_shuffled", False),
+    ],
+)
+def test_a_wrong_calibration_leaves_a_model_its_pair(tmp_path, trained_under, seen, pair):
+    control = {"name": seen, "degrees": 1.0}
+    of_training = trained("stereo", 0, control={"name": trained_under, "degrees": 1.0})
+    folder = evaluation(tmp_path / "run", trained=of_training, control=control)
+    assert read_models([folder])[0].uses_pair == pair
+
+
 def test_best_median_and_worst():
     keys = [("mug", f"m{i}", 0) for i in range(4)] + [("bowl", "b0", 0), ("bowl", "b1", 0)]
     chosen = best_median_worst(keys, np.array([0.4, 0.1, 0.3, 0.2, 0.9, 0.8]))

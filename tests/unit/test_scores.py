@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from stereo_occ.data.batch import Batch, Queries, ViewId
-from stereo_occ.metrics.scores import METRICS, THRESHOLDS, Scores
+from stereo_occ.metrics.scores import IOU_OF, THRESHOLDS, Scores
 from stereo_occ.models.base import StereoViews
 
 CERTAIN = 9.0
@@ -16,13 +16,13 @@ def batch_of(*views, occupied=(1.0, 1.0, 0.0, 0.0)):
     queries = Queries(torch.zeros(len(views), 4, 3), torch.tensor([occupied] * len(views)))
     return Batch(
         StereoViews(empty, empty, empty, empty),
-        dict.fromkeys(METRICS, queries),
+        dict.fromkeys(IOU_OF, queries),
         [ViewId(*view) for view in views],
     )
 
 
 def logits(*rows):
-    return dict.fromkeys(METRICS, CERTAIN * (2 * torch.tensor(rows, dtype=torch.float32) - 1))
+    return dict.fromkeys(IOU_OF, CERTAIN * (2 * torch.tensor(rows, dtype=torch.float32) - 1))
 
 
 RIGHT, HALF, WRONG = (1, 1, 0, 0), (1, 0, 0, 0), (0, 0, 1, 1)  # IoU 1, 1/2, 0
@@ -60,7 +60,7 @@ def test_views_count_alike_whatever_batch_they_came_in():
 def test_other_candidate_thresholds():
     scores = Scores(torch.tensor([0.01, 0.02, 0.03]))
     probability = torch.tensor([[0.025, 0.025, 0.015, 0.015]])
-    scores.update(batch_of(("mug", "a", 0)), dict.fromkeys(METRICS, torch.logit(probability)))
+    scores.update(batch_of(("mug", "a", 0)), dict.fromkeys(IOU_OF, torch.logit(probability)))
     assert scores.best_threshold() == pytest.approx(0.02)
 
 
@@ -68,7 +68,7 @@ def test_the_threshold_that_suits_a_timid_model():
     """Probability 0.3 inside and 0.1 outside: thresholds between separate them, 0.5 predicts nothing."""
     scores = Scores()
     probability = torch.tensor([[0.3, 0.3, 0.1, 0.1]])
-    scores.update(batch_of(("mug", "a", 0)), dict.fromkeys(METRICS, torch.logit(probability)))
+    scores.update(batch_of(("mug", "a", 0)), dict.fromkeys(IOU_OF, torch.logit(probability)))
     assert scores.best_threshold() == pytest.approx(0.3, abs=0.051)
     assert scores.summary(scores.best_threshold())["iou"] == 1
     assert scores.summary(0.5)["iou"] == 0
@@ -91,8 +91,8 @@ def test_every_candidate_threshold_survives_storage_as_a_float():
     queries = Queries(torch.zeros(1, 400, 3), occupied[None])
     scores = Scores()
     scores.update(
-        Batch(batch.views, dict.fromkeys(METRICS, queries), batch.ids),
-        dict.fromkeys(METRICS, torch.logit(probability)),
+        Batch(batch.views, dict.fromkeys(IOU_OF, queries), batch.ids),
+        dict.fromkeys(IOU_OF, torch.logit(probability)),
     )
     ious = [scores.summary(float(torch.tensor(t).float()))["iou"] for t in THRESHOLDS.tolist()]
     assert len(set(ious)) == len(THRESHOLDS)
@@ -112,4 +112,4 @@ def test_summary_keys_are_those_of_the_protocol():
     scores = Scores()
     scores.update(batch_of(("mug", "a", 0), ("bowl", "b", 0)), logits(RIGHT, RIGHT))
     parts = ("", "/mug", "/bowl", "/all")
-    assert set(scores.summary(0.5)) == {metric + part for metric in METRICS.values() for part in parts}
+    assert set(scores.summary(0.5)) == {metric + part for metric in IOU_OF.values() for part in parts}
