@@ -25,7 +25,6 @@ from runs import (
     RECIPE,
     REPEATED,
     RUNS,
-    SHORT,
     SURFACES,
     WHOLE,
     load,
@@ -127,7 +126,7 @@ WITH_INTERVALS = (
 def summary() -> dict[str, Any]:
     """Every run's metrics with their intervals, and what it has over mono."""
     runs: dict[str, Any] = {}
-    for folder in (*(folder for folder in RUNS if folder.parent != SHORT), FIELD):
+    for folder in (*RUNS, FIELD):
         mono = folder.with_name(MONO)
         run: dict[str, Any] = {"settings": RUNS.get(folder, "experiment=field")}
         for where in ("test", "real"):

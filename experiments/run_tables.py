@@ -12,7 +12,6 @@ from runs import (
     MONO,
     REPEATED,
     RUNS,
-    SHORT,
     SURFACES,
     load,
     metrics_of,
@@ -53,7 +52,7 @@ def trained() -> str:
                 cells.iou(metrics),
                 f"{metrics['test/iou_bbox']:.3f}",
                 f"{metrics['test/iou_unrotated']:.3f}",
-                f"{real['metrics']['test/iou']:.3f} ({real['objects']})",
+                f"{real['metrics']['test/iou']:.3f}",
             ]
         )
     return cells.table(head, rows)
@@ -178,7 +177,7 @@ def parts() -> str:
         "hidden surface": "recall_2_occluded",
     }
     rows = []
-    for folder in (folder for folder in RUNS if folder.parent != SHORT):
+    for folder in RUNS:
         test, real = (metrics_of(folder, where) for where in ("test", "real"))
         values = (f"{test[f'test/{metric}']:.2f}" for metric in columns.values())
         sides = (f"{real[f'test/recall_2_{side}']:.2f}" for side in ("visible", "occluded"))

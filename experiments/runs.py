@@ -26,8 +26,6 @@ AIDED = f"model=plane_sweep_stereo {AID}"
 GUIDED = f"model=plane_sweep_guided {AID}"
 #: Settings of each run; those of a family are compared with its :data:`MONO`.
 RUNS = {
-    SHORT / "mono": "model=mono model.encoder.weights=null steps=4000",
-    SHORT / "stereo": "model=stereo steps=4000",
     RECIPE / "mono_scratch": "experiment=recipe model=mono_scratch steps=10000",
     RECIPE / "stereo": "experiment=recipe model=stereo steps=10000",
     RECIPE / "stereo_signed": "experiment=recipe model=stereo_signed steps=10000",
