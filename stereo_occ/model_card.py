@@ -25,7 +25,7 @@ def model_card(
         f"# {name}",
         "",
         f"`model.name={config['model']['name']}`, {parameters / 1e6:.1f} M parameters, {size / 1e6:.1f} MB, "
-        f"images of {data['image_side']} pixels, decision threshold {description['threshold']:.2f}{_rule(config)}.",
+        f"images of {data['image_side']} pixels, decision threshold {description['threshold']:.3g}{_rule(config)}.",
         "",
         "## Use",
         "```",
@@ -33,7 +33,7 @@ def model_card(
         "```",
         "",
         "## Training",
-        f"{description['step']} steps on {', '.join(categories)} of `data={data['name']}` with "
+        f"{description['step']} of {config['steps']} steps on {', '.join(categories)} of `data={data['name']}` with "
         f"`rig.kind={config['rig'].get('kind', 'toed_in')}`, `placement.kind={config['placement']['kind']}`; "
         f"rendered pictures alone, {data['views']} pairs of each object. The whole configuration is in `{name}.json`.",
         *(["```", command, "```"] if command else []),
