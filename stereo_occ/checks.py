@@ -180,8 +180,19 @@ def _model(cfg: DictConfig) -> Iterator[str]:
     config = OmegaConf.to_object(cfg.rig)
     assert isinstance(config, RigConfig)
     rig = build_rig(config, cfg.data.image_side)
+    if cfg.rig.kind != ToedInRigConfig.kind and _of_one_rig(cfg.model):
+        yield (
+            f"model.cost_volume.name={cfg.model.cost_volume.name}: has the disparities of one rig, and rig.kind="
+            f"{cfg.rig.kind} gives each pair its own; say model/cost_volume=plane_sweep, which reads the cameras"
+        )
     with torch.device("meta"):
         yield from _refusal(build_model, OmegaConf.to_container(cfg.model, resolve=True), rig, False)
+
+
+def _of_one_rig(model: DictConfig) -> bool:
+    """Whether the slices of the model's cost volume are the disparities that a rig can have."""
+    volume = model.get("cost_volume") or {}
+    return volume.get("name") == "correlation_signed" or volume.get("disparities", 0) is None
 
 
 def _schedule(cfg: DictConfig) -> Iterator[str]:

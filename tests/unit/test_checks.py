@@ -131,6 +131,22 @@ def test_every_problem_is_reported_at_once():
     ]
 
 
+@pytest.mark.parametrize(
+    ("model", "volume"),
+    [
+        (["model=stereo_signed"], "correlation_signed"),
+        (["model=stereo", "model/cost_volume=concat", "model.cost_volume.disparities=null"], "concat"),
+    ],
+)
+def test_the_disparities_of_one_rig_are_not_those_of_many(model, volume):
+    (problem,) = find_problems("train", [*model, "rig=randomised"], check_training)
+    assert problem.startswith(
+        f"model.cost_volume.name={volume}: has the disparities of one rig, and rig.kind="
+    )
+    advised = [problem.rpartition("; say ")[2].partition(",")[0]]
+    assert find_problems("train", ["model=stereo", *advised, "rig=randomised"], check_training) == []
+
+
 def test_a_mesh_folder_must_exist(tmp_path):
     overrides = ["data=meshes", f"data.root={tmp_path / 'nowhere'}"]
     for program, check in (("train", check_training), ("render", check_pairs)):
