@@ -83,8 +83,8 @@ class OccupancyTask(lightning.LightningModule):
             code = self.model.encode(batch.views)
         logits_BN = self.model.decode(code, queries.points_BN3)
         loss = binary_cross_entropy_with_logits(logits_BN, queries.occupied_BN)
-        loss = loss + self.model.guidance(code, queries.points_BN3, queries.occupied_BN)
         self.log("train/loss", loss, prog_bar=True, batch_size=len(batch))
+        loss = loss + self.model.guidance(code, queries.points_BN3, queries.occupied_BN)
         if self.auxiliary is not None:
             losses = auxiliary_losses(self.auxiliary, features[0], batch, self.model.seen_depths(code))
             for name, value in losses.items():

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 from stereo_occ.geometry.camera import Camera, StereoRig
 
+#: OpenCV looks for a multiple of so many disparities.
+MULTIPLE = 16
+
 #: Corners of a grid over the working cube, which disparities must cover.
 _GRID = np.array(list(product(np.linspace(-0.5, 0.5, 9), repeat=3)))
 
@@ -24,7 +27,8 @@ class RectifiedPair:
     """Cameras with a common orientation, focal length and rows, and the pair they were made from.
 
     Attributes:
-        disparities: lowest and highest whole disparity of the working cube as far as both cameras see it, pixels.
+        disparities: lowest and highest whole disparity to look for, pixels: all of the working cube as far as both
+            cameras see it, in a number that OpenCV takes.
     """
 
     rig: StereoRig
@@ -114,7 +118,8 @@ def _disparities(rig: StereoRig, turned: list[Camera], middle_22: NDArray[np.flo
     points_N3 = _GRID[seen_N]
     u_left_N, u_right_N = (camera.project(points_N3)[0][:, 0] for camera in turned)
     disparity_N = (u_left_N - middle_22[0, 0]) - (u_right_N - middle_22[1, 0])
-    return floor(disparity_N.min()), ceil(disparity_N.max())
+    low, high = floor(disparity_N.min()), ceil(disparity_N.max())
+    return low, low + ceil((high - low + 1) / MULTIPLE) * MULTIPLE - 1
 
 
 def _warp(image_HWC: NDArray[np.uint8], source: Camera, target: Camera) -> NDArray[np.uint8]:

@@ -54,7 +54,7 @@ def match(
     penalty = config.smoothness * rgb_2HWC.shape[-1] * config.block**2
     matcher = cv2.StereoSGBM.create(
         minDisparity=low,
-        numDisparities=-(-(high - low + 1) // 16) * 16,
+        numDisparities=high - low + 1,
         blockSize=config.block,
         P1=round(8 * penalty),
         P2=round(32 * penalty),
