@@ -1,10 +1,12 @@
 """``python -m stereo_occ.compare`` on small result folders."""
 
 import csv
+import errno
 import json
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from samples import single_line
 
@@ -99,6 +101,19 @@ def test_other_training_objects_are_noted(tmp_path, capsys):
     printed, record = run(tmp_path, capsys, a, b)
     assert record["notes"] == ["split differs: {'hash': 'a'} | {'hash': 'b'}"]
     assert "note: split differs" in printed
+
+
+def test_what_differs_in_any_folder_is_noted(tmp_path, capsys):
+    a = evaluation(tmp_path / "a", hard)
+    evaluation(tmp_path / "b_1", hard)
+    evaluation(tmp_path / "b_2", hard, data="y")
+    _, record = run(tmp_path, capsys, a, tmp_path / "b_*")
+    assert record["notes"] == ["data differs: x | y"]
+
+
+def test_a_folder_may_be_called_anything(tmp_path, capsys):
+    a, b = evaluation(tmp_path / r"a_$\no$", hard), evaluation(tmp_path / "b", hard)
+    run(tmp_path, capsys, a, b)
 
 
 @pytest.mark.parametrize(
@@ -218,6 +233,25 @@ def test_nothing_is_written_where_not_all_can_be(tmp_path, capsys):
     assert (
         "Not a directory; choose another folder" in message or "File exists; choose another folder" in message
     )
+
+
+def test_a_plot_that_cannot_be_written_leaves_nothing(tmp_path, capsys, monkeypatch):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device", "comparison.png")
+
+    a = evaluation(tmp_path / "a", hard)
+    monkeypatch.setattr(Figure, "savefig", full)
+    message = refusal(capsys, a, a, "--output", tmp_path / "out")
+    assert "comparison.png: No space left on device; free some disk space" in message
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_an_output_that_refers_to_itself(tmp_path, capsys):
+    a = evaluation(tmp_path / "a", hard)
+    (tmp_path / "loop").symlink_to("loop")
+    message = refusal(capsys, a, a, "--output", tmp_path / "loop" / "out")
+    assert single_line(message.rstrip("\n").replace(str(tmp_path), ""))
+    assert "symbolic links; choose another folder" in message
 
 
 def test_folders_that_are_not_there(tmp_path, capsys):
