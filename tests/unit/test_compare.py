@@ -178,22 +178,56 @@ def cut(path, size):
 @pytest.mark.parametrize(
     ("damage", "complaint"),
     [
-        (lambda folder: cut(folder / "per_object.csv", -5), "per_object.csv: is cut off after 24 rows"),
+        (lambda folder: cut(folder / "per_object.csv", -5), "per_object.csv: is cut off after 23 rows"),
         (
             lambda folder: append(folder / "per_object.csv", b"mug,mug_7"),
-            "has no per_object.csv with category, object_id, view",
+            "per_object.csv: is cut off after 24 rows",
+        ),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_7\n"),
+            "per_object.csv: is damaged in row 25, which has not as many cells as the head",
+        ),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_7,0,,0.1,,,0.5\n"),
+            "per_object.csv: is damaged in row 25, which has not as many cells as the head",
+        ),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_5,1,,0.1,,\n"),
+            "per_object.csv: is damaged in row 25, 'mug/mug_5/1' is there twice",
+        ),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_7,0,,half,,\n"),
+            "per_object.csv: is damaged in row 25, could not convert string to float: 'half'",
+        ),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_7,0,,nan,,\n"),
+            "per_object.csv: is damaged in row 25, iou is 'nan'",
         ),
         (lambda folder: cut(folder / "per_object.csv", 60), "per_object.csv: is cut off after 0 rows"),
         (
             lambda folder: (folder / "per_object.csv").write_bytes(b"category,\xff\n"),
-            "has no per_object.csv with",
+            "has no readable per_object.csv",
         ),
-        (lambda folder: (folder / "per_object.csv").unlink(), "has no per_object.csv with"),
+        (
+            lambda folder: (folder / "per_object.csv").write_text("category,object_id,view\nmug,mug_0,0\n"),
+            "per_object.csv: has no column iou",
+        ),
+        (lambda folder: (folder / "per_object.csv").unlink(), "has no readable per_object.csv"),
         (lambda folder: cut(folder / "metrics.json", 30), "has no readable metrics.json"),
         (lambda folder: (folder / "metrics.json").write_text("[1]"), "is no evaluation of form 2"),
         (lambda folder: damage_facts(folder, points=None), "metrics.json: is damaged, points is None"),
         (lambda folder: damage_facts(folder, trained=3), "metrics.json: is damaged, trained is 3"),
-        (lambda folder: damage_facts(folder, trained={"config": []}), "metrics.json: is damaged, trained is"),
+        (lambda folder: damage_facts(folder, trained={"config": []}), "is damaged, trained.config is []"),
+        (lambda folder: damage_facts(folder, points=True), "is damaged, points is True"),
+        (
+            lambda folder: damage_facts(folder, trained={"config": {"model": {"name": 3}}}),
+            "is damaged, trained.config.model.name is 3",
+        ),
+        (
+            lambda folder: damage_facts(folder, predictor={"baseline": 3}),
+            "is damaged, predictor.baseline is 3",
+        ),
+        (lambda folder: damage_facts(folder, control={"name": []}), "is damaged, control.name is []"),
         (lambda folder: damage_facts(folder, metrics=[0.5]), "metrics.json: is damaged, metrics is [0.5]"),
     ],
 )
