@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 from runs import CATEGORIES, FLOORS, SHORT, load, metrics_of, runs_of
 
-METRICS = {"iou": "-", "iou_bbox": "--", "iou_unrotated": ":"}
+LINE_OF = {"iou": "-", "iou_bbox": "--", "iou_unrotated": ":"}
 
 
 def curves() -> None:
@@ -17,7 +17,7 @@ def curves() -> None:
     for axis, where in zip(axes, ("test", "real"), strict=True):
         for color, name in enumerate(("stereo", "mono")):
             curve: list[dict[str, Any]] = load(SHORT / name / "curve.json")
-            for metric, style in METRICS.items():
+            for metric, style in LINE_OF.items():
                 values = [entry[where][f"test/{metric}"] for entry in curve]
                 steps = [entry["step"] for entry in curve]
                 axis.plot(steps, values, style, color=f"C{color}", label=f"{name} {metric}")
@@ -30,8 +30,8 @@ def curves() -> None:
 
 def recipe_curves(family: Path) -> None:
     """Each metric along the training of each model of a family, on validation objects, beside two floors."""
-    figure, axes = plt.subplots(1, len(METRICS), figsize=(11, 3.4), layout="constrained")
-    for axis, metric in zip(axes, METRICS, strict=True):
+    figure, axes = plt.subplots(1, len(LINE_OF), figsize=(11, 3.4), layout="constrained")
+    for axis, metric in zip(axes, LINE_OF, strict=True):
         for folder in runs_of(family):
             history = load(folder / "training.json")["history"]
             steps = [entry["step"] for entry in history]

@@ -33,7 +33,8 @@ def forest_figure(results: Mapping[str, Mapping[str, Difference]], name_a: str, 
         _panel(axis, metric, differences)
     for axis in axes[len(results) :]:
         axis.set_axis_off()
-    figure.suptitle(f"A - B with 95 % intervals\nA: {name_a}   B: {name_b}", fontsize=9)
+    title = f"A - B with 95 % intervals\nA: {name_a}   B: {name_b}"
+    figure.suptitle(title, fontsize=9, parse_math=False)  # a folder's name may hold dollars
     return figure
 
 

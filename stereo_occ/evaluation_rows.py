@@ -7,28 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from glob import glob
 from pathlib import Path
-from types import UnionType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stereo_occ.errors import UserError
+from stereo_occ.evaluation_form import IDENTITY, wrong_value
 from stereo_occ.metrics.summary import METRICS, ROW_KEYS
 from stereo_occ.provenance import SCHEMA
 
-#: What is in every ``metrics.json`` of an evaluation, and what may be.
-FORM: dict[str, type | UnionType] = {
-    "subset": str,
-    "protocol": int,
-    "views": int,
-    "points": int,
-    "meshes": dict,
-    "metrics": dict,
-    "predictor": dict | None,
-    "control": dict | None,
-    "split": dict | None,
-}
+#: What every object-view has a value of, so that no table is without it.
+ALWAYS = "iou"
 
 #: Category, object, view.
 Key = tuple[str, str, int]
@@ -108,15 +98,9 @@ def read_facts(folder: Path) -> dict[str, Any]:
         raise UserError(
             f"{folder}/metrics.json: is no evaluation of form {SCHEMA}; evaluate the checkpoint again"
         )
-    wrong = [key for key, kind in FORM.items() if not isinstance(facts.get(key), kind)]
-    trained = facts.get("trained")
-    if trained is not None and not (isinstance(trained, dict) and isinstance(trained.get("config"), dict)):
-        wrong.append("trained")
+    wrong = wrong_value(facts, IDENTITY)
     if wrong:
-        raise UserError(
-            f"{folder}/metrics.json: is damaged, {wrong[0]} is {facts.get(wrong[0])!r:.60}; evaluate the checkpoint "
-            f"again"
-        )
+        raise UserError(f"{folder}/metrics.json: is damaged, {wrong}; evaluate the checkpoint again")
     return facts
 
 
@@ -124,17 +108,38 @@ def _table(folder: Path) -> dict[Key, dict[str, float]]:
     path = folder / "per_object.csv"
     try:
         text = path.read_bytes().decode()
-        rows = list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
-        table = {
-            (row["category"], row["object_id"], int(row["view"])): {
-                name: float(cell) for name, cell in row.items() if name in METRICS and cell
-            }
-            for row in rows
-        }
-    except (OSError, KeyError, ValueError, TypeError, csv.Error) as error:
-        raise UserError(
-            f"{folder}: has no per_object.csv with {', '.join(ROW_KEYS)}; evaluate the checkpoint again"
-        ) from error
-    if not rows or not text.endswith("\n") or any(None in row.values() for row in rows):
-        raise UserError(f"{path}: is cut off after {len(rows)} rows; evaluate the checkpoint again")
+    except (OSError, ValueError) as error:
+        raise UserError(f"{folder}: has no readable per_object.csv; evaluate the checkpoint again") from error
+    table: dict[Key, dict[str, float]] = {}
+    try:
+        reader = csv.DictReader(io.StringIO(text, newline=""), strict=True)
+        missing = [name for name in (*ROW_KEYS, ALWAYS) if name not in (reader.fieldnames or ())]
+        if missing and text:
+            raise UserError(f"{path}: has no column {missing[0]}; evaluate the checkpoint again")
+        for row in reader:
+            _add_row(table, row)
+    except (ValueError, csv.Error) as error:
+        if text.endswith("\n"):
+            raise UserError(
+                f"{path}: is damaged in row {len(table) + 1}, {error!s:.90}; evaluate the checkpoint again"
+            ) from error
+    if not table or not text.endswith("\n"):
+        raise UserError(f"{path}: is cut off after {len(table)} rows; evaluate the checkpoint again")
     return table
+
+
+def _add_row(table: dict[Key, dict[str, float]], row: dict[str, str]) -> None:
+    """Add a row as ``csv.DictReader`` gives it.
+
+    Raises:
+        ValueError: it has more or fewer cells than the head, a word for a number, no IoU, or is there already.
+    """
+    if None in row or None in row.values():
+        raise ValueError("which has not as many cells as the head")
+    key = (row["category"], row["object_id"], int(row["view"]))
+    if key in table:
+        raise ValueError(f"{'/'.join(map(str, key))!r} is there twice")
+    values = {name: float(cell) for name, cell in row.items() if name in METRICS and cell}
+    if not np.isfinite(values.get(ALWAYS, np.nan)):
+        raise ValueError(f"{ALWAYS} is {row[ALWAYS]!r}")
+    table[key] = values

@@ -19,6 +19,7 @@ REMEDIES = {
     errno.ENOTDIR: "choose another folder",
     errno.EEXIST: "choose another folder",
     errno.EISDIR: "choose another name",
+    errno.ELOOP: "choose another folder",
     errno.EMFILE: "raise the limit on open files (ulimit -n)",
     errno.ENFILE: "close other programs",
 }
@@ -36,7 +37,7 @@ def refusal(error: BaseException) -> str | None:
     if isinstance(error, MemoryError | torch.OutOfMemoryError) or (
         isinstance(error, RuntimeError) and any(begin in str(error)[:300] for begin in NO_MEMORY)
     ):
-        return "not enough memory; ask for less (batch_size, views, workers), or close other programs"
+        return "not enough memory; ask for less (batch_size, views, workers, draws), or close other programs"
     return None
 
 

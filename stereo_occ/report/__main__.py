@@ -6,6 +6,7 @@ from pathlib import Path
 from omegaconf import DictConfig, ListConfig, OmegaConf
 
 from stereo_occ.cli import entry_point
+from stereo_occ.compare import MOST_DRAWS
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.report.config import ReportConfig
 from stereo_occ.report.content import read_content
@@ -25,8 +26,8 @@ def check_report(cfg: DictConfig) -> list[str]:
         problems.append(f"output={cfg.output}: must end in .html")
     page = Path(cfg.output)
     problems += in_the_way(cfg.output, (page, page.with_suffix(".md")), kind="report")
-    if cfg.draws < 1:
-        problems.append(f"draws={cfg.draws}: must be at least 1")
+    if not 1 <= cfg.draws <= MOST_DRAWS:
+        problems.append(f"draws={cfg.draws}: must be from 1 to {MOST_DRAWS}")
     return problems
 
 

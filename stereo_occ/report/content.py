@@ -1,7 +1,7 @@
 """What the page and its Markdown version show, read from the folders of evaluations."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -117,7 +117,8 @@ def _counts(models: figures.Colored, notes: list[str]) -> dict[str, dict[str, ND
     counts: dict[str, dict[str, NDArray[np.int64]]] = {}
     for model, _ in models:
         for folder in model.folders:
-            for category, counts_2K in _curves(folder / "curves.json").items():
+            categories = {key[0] for key in model.evaluations.keys}
+            for category, counts_2K in _curves(folder / "curves.json", categories).items():
                 of_model = counts.setdefault(model.label, {})
                 of_model[category] = of_model.get(category, 0) + counts_2K
     without = [model.label for model, _ in models if model.label not in counts]
@@ -128,19 +129,23 @@ def _counts(models: figures.Colored, notes: list[str]) -> dict[str, dict[str, ND
     return counts
 
 
-def _curves(path: Path) -> dict[str, NDArray[np.int64]]:
+def _curves(path: Path, categories: Iterable[str]) -> dict[str, NDArray[np.int64]]:
     if not path.is_file():
         return {}
     try:
-        content = json.loads(path.read_text())
+        content = json.loads(path.read_text(encoding="utf-8"))
         if not np.allclose(content["levels"], LEVELS):
             raise ValueError("levels")
-        return {
+        of_category = {category: content["categories"][category] for category in categories}
+        counts = {
             category: np.array([sides["empty"], sides["occupied"]], dtype=np.int64)
-            for category, sides in content["categories"].items()
+            for category, sides in of_category.items()
         }
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        if any(of.shape != (2, len(LEVELS) + 1) or (of < 0).any() for of in counts.values()):
+            raise ValueError("counts")
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         raise UserError(f"{path}: is damaged or of another version; evaluate the checkpoint again") from error
+    return counts
 
 
 def _galleries(

@@ -11,6 +11,7 @@ from stereo_occ.compare import check_alike
 from stereo_occ.errors import UserError
 from stereo_occ.evaluation_rows import Evaluations, read_evaluations, read_facts
 from stereo_occ.model_settings import Settings, model_settings
+from stereo_occ.report.facts import check_shown
 from stereo_occ.shapes.shape import CATEGORIES
 
 #: Controls that leave a model two views of one object.
@@ -66,7 +67,8 @@ def read_models(folders: Sequence[Path]) -> list[Model]:
     """The models of these evaluations, in the order in which they first come.
 
     Raises:
-        UserError: a folder is none of an evaluation, or they were not measured on the same test set in the same way.
+        UserError: a folder is none of an evaluation, its files are damaged, or they were not measured on the same test
+            set in the same way.
     """
     groups: dict[str, list[Path]] = {}
     settings: dict[str, Settings] = {}
@@ -84,6 +86,8 @@ def read_models(folders: Sequence[Path]) -> list[Model]:
         check_alike(models[0].evaluations, model.evaluations)
         for facts, folder in zip(model.evaluations.facts, model.folders, strict=True):
             _check_same_test_set(models[0], facts, folder)
+            categories = {key[0] for key in model.evaluations.keys}
+            check_shown(facts, categories, folder / "metrics.json")
     return models
 
 

@@ -55,10 +55,10 @@ def run_facts(content: Content) -> list[dict[str, Any]]:
             "color": color,
             "folder": str(folder),
             "seed": "" if seed is None else seed,
-            "step": facts["step"] if facts["step"] is not None else "",
-            "parameters": f"{facts['parameters'] / 1e6:.1f} M" if facts["parameters"] else "",
+            "step": "" if facts.get("step") is None else facts["step"],
+            "parameters": f"{facts['parameters'] / 1e6:.1f} M" if facts.get("parameters") else "",
             "threshold": f"{facts['threshold']:.2f}",
-            "commit": f"{(facts['commit'] or 'unknown')[:10]}{'+' if facts['dirty'] else ''}",
+            "commit": f"{(facts.get('commit') or 'unknown')[:10]}{'+' if facts.get('dirty') else ''}",
             "failures": ", ".join(f"{count} {name}" for name, count in facts["failures"].items()) or "none",
         }
         for model, color in content.models

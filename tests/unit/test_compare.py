@@ -1,10 +1,12 @@
 """``python -m stereo_occ.compare`` on small result folders."""
 
 import csv
+import errno
 import json
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from samples import single_line
 
@@ -101,6 +103,19 @@ def test_other_training_objects_are_noted(tmp_path, capsys):
     assert "note: split differs" in printed
 
 
+def test_what_differs_in_any_folder_is_noted(tmp_path, capsys):
+    a = evaluation(tmp_path / "a", hard)
+    evaluation(tmp_path / "b_1", hard)
+    evaluation(tmp_path / "b_2", hard, data="y")
+    _, record = run(tmp_path, capsys, a, tmp_path / "b_*")
+    assert record["notes"] == ["data differs: x | y"]
+
+
+def test_a_folder_may_be_called_anything(tmp_path, capsys):
+    a, b = evaluation(tmp_path / r"a_$\no$", hard), evaluation(tmp_path / "b", hard)
+    run(tmp_path, capsys, a, b)
+
+
 @pytest.mark.parametrize(
     ("facts", "complaint"),
     [
@@ -163,22 +178,56 @@ def cut(path, size):
 @pytest.mark.parametrize(
     ("damage", "complaint"),
     [
-        (lambda folder: cut(folder / "per_object.csv", -5), "per_object.csv: is cut off after 24 rows"),
+        (lambda folder: cut(folder / "per_object.csv", -5), "per_object.csv: is cut off after 23 rows"),
         (
             lambda folder: append(folder / "per_object.csv", b"mug,mug_7"),
-            "has no per_object.csv with category, object_id, view",
+            "per_object.csv: is cut off after 24 rows",
+        ),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_7\n"),
+            "per_object.csv: is damaged in row 25, which has not as many cells as the head",
+        ),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_7,0,,0.1,,,0.5\n"),
+            "per_object.csv: is damaged in row 25, which has not as many cells as the head",
+        ),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_5,1,,0.1,,\n"),
+            "per_object.csv: is damaged in row 25, 'mug/mug_5/1' is there twice",
+        ),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_7,0,,half,,\n"),
+            "per_object.csv: is damaged in row 25, could not convert string to float: 'half'",
+        ),
+        (
+            lambda folder: append(folder / "per_object.csv", b"mug,mug_7,0,,nan,,\n"),
+            "per_object.csv: is damaged in row 25, iou is 'nan'",
         ),
         (lambda folder: cut(folder / "per_object.csv", 60), "per_object.csv: is cut off after 0 rows"),
         (
             lambda folder: (folder / "per_object.csv").write_bytes(b"category,\xff\n"),
-            "has no per_object.csv with",
+            "has no readable per_object.csv",
         ),
-        (lambda folder: (folder / "per_object.csv").unlink(), "has no per_object.csv with"),
+        (
+            lambda folder: (folder / "per_object.csv").write_text("category,object_id,view\nmug,mug_0,0\n"),
+            "per_object.csv: has no column iou",
+        ),
+        (lambda folder: (folder / "per_object.csv").unlink(), "has no readable per_object.csv"),
         (lambda folder: cut(folder / "metrics.json", 30), "has no readable metrics.json"),
         (lambda folder: (folder / "metrics.json").write_text("[1]"), "is no evaluation of form 2"),
         (lambda folder: damage_facts(folder, points=None), "metrics.json: is damaged, points is None"),
         (lambda folder: damage_facts(folder, trained=3), "metrics.json: is damaged, trained is 3"),
-        (lambda folder: damage_facts(folder, trained={"config": []}), "metrics.json: is damaged, trained is"),
+        (lambda folder: damage_facts(folder, trained={"config": []}), "is damaged, trained.config is []"),
+        (lambda folder: damage_facts(folder, points=True), "is damaged, points is True"),
+        (
+            lambda folder: damage_facts(folder, trained={"config": {"model": {"name": 3}}}),
+            "is damaged, trained.config.model.name is 3",
+        ),
+        (
+            lambda folder: damage_facts(folder, predictor={"baseline": 3}),
+            "is damaged, predictor.baseline is 3",
+        ),
+        (lambda folder: damage_facts(folder, control={"name": []}), "is damaged, control.name is []"),
         (lambda folder: damage_facts(folder, metrics=[0.5]), "metrics.json: is damaged, metrics is [0.5]"),
     ],
 )
@@ -218,6 +267,25 @@ def test_nothing_is_written_where_not_all_can_be(tmp_path, capsys):
     assert (
         "Not a directory; choose another folder" in message or "File exists; choose another folder" in message
     )
+
+
+def test_a_plot_that_cannot_be_written_leaves_nothing(tmp_path, capsys, monkeypatch):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device", "comparison.png")
+
+    a = evaluation(tmp_path / "a", hard)
+    monkeypatch.setattr(Figure, "savefig", full)
+    message = refusal(capsys, a, a, "--output", tmp_path / "out")
+    assert "comparison.png: No space left on device; free some disk space" in message
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_an_output_that_refers_to_itself(tmp_path, capsys):
+    a = evaluation(tmp_path / "a", hard)
+    (tmp_path / "loop").symlink_to("loop")
+    message = refusal(capsys, a, a, "--output", tmp_path / "loop" / "out")
+    assert single_line(message.rstrip("\n").replace(str(tmp_path), ""))
+    assert "symbolic links; choose another folder" in message
 
 
 def test_folders_that_are_not_there(tmp_path, capsys):

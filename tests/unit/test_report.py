@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import io
+import json
 import re
 import shutil
 
@@ -18,6 +19,7 @@ from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import toed_in_rig
 from stereo_occ.kept_views import read_kept_views
 from stereo_occ.mesh_output import few_faces
+from stereo_occ.metrics.curves import LEVELS
 from stereo_occ.report import figures
 from stereo_occ.report.__main__ import check_report, report
 from stereo_occ.report.gallery import GalleryRow, Panel, make_row
@@ -206,6 +208,62 @@ def test_what_is_not_of_one_test_set_is_one_line(tmp_path, facts, complaint):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("facts", "complaint"),
+    [
+        ({"metrics": {}}, "metrics.test/iou is None"),
+        ({"metrics": {"test/iou": float("nan")}}, "metrics.test/iou is nan"),
+        ({"threshold": "0.5"}, "threshold is '0.5'"),
+        ({"meshes": {}}, "meshes.views is None"),
+        ({"trained": 3}, "trained is 3"),
+        ({"trained": None, "parameters": "many"}, "parameters is 'many'"),
+        ({"trained": trained("stereo", 0) | {"history": 3}}, "trained.history is 3"),
+        ({"trained": trained("stereo", 0) | {"history": [3]}}, "trained.history has 3"),
+        ({"trained": trained("stereo", 0) | {"history": [{"val/iou": 1}]}}, "trained.history: step is None"),
+        ({"trained": {"config": {}}}, "trained.config.model is None"),
+        ({"reliability": None}, "reliability is None"),
+        ({"reliability": {"mug": []}}, "reliability of"),
+        ({"reliability": {"mug": [[1, 0.5]], "bowl": [[1, 0.5]]}}, "is [[1, 0.5]]"),
+        ({"reliability": {"mug": [[1, -9, 0.5]], "bowl": [[1, -9, 0.5]]}}, "is [[1, -9, 0.5]]"),
+    ],
+)
+def test_damaged_metrics_are_one_line(tmp_path, facts, complaint):
+    folder = evaluation(tmp_path / "a", **facts)
+    with pytest.raises(UserError) as refusal:
+        run(tmp_path, folder)
+    message = str(refusal.value)
+    assert message.startswith(f"{folder}/metrics.json: is damaged, ")
+    assert complaint in message
+    assert single_line(message.replace(str(tmp_path), ""))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("of_mugs", "of_bowls"),
+    [
+        (3, 3),
+        ({"empty": [1] * 130, "occupied": [1] * 130}, None),
+        ({"empty": [1], "occupied": [1]}, {"empty": [1], "occupied": [1]}),
+        ({"empty": [10**30] * 130, "occupied": [1] * 130}, {"empty": [1] * 130, "occupied": [1] * 130}),
+        ({"empty": [-1] * 130, "occupied": [1] * 130}, {"empty": [1] * 130, "occupied": [1] * 130}),
+    ],
+)
+def test_damaged_curves_are_one_line(tmp_path, of_mugs, of_bowls):
+    folder = evaluation(tmp_path / "a")
+    curves = {"levels": LEVELS.tolist(), "categories": {"mug": of_mugs, "bowl": of_bowls}}
+    (folder / "curves.json").write_text(json.dumps(curves))
+    with pytest.raises(UserError, match=r"a/curves\.json: is damaged or of another version"):
+        run(tmp_path, folder)
+
+
+def test_a_label_is_no_formula(tmp_path):
+    folders = [
+        evaluation(tmp_path / name, trained=trained("stereo", 0, steps=rf"$\no_{name}$")) for name in "ab"
+    ]
+    page, _ = run(tmp_path, *folders)
+    assert r"stereo, steps=$\no_a$" in page
+
+
 def test_folders_that_hold_no_evaluation(tmp_path, views):
     a = evaluation(tmp_path / "a", views=views)
     with pytest.raises(UserError, match="no such folder; give the folder of an evaluation"):
@@ -228,7 +286,8 @@ def test_folders_that_hold_no_evaluation(tmp_path, views):
     ("override", "complaint"),
     [
         ("output=x.pdf", "must end in .html"),
-        ("draws=0", "must be at least 1"),
+        ("draws=0", "must be from 1 to 100000"),
+        ("draws=100000000000", "must be from 1 to 100000"),
         ("runs=[]", "names no folder"),
     ],
 )
