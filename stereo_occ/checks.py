@@ -10,6 +10,7 @@ import torch
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.baselines.config import baseline_problems
+from stereo_occ.cores import beyond_cores
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.controls import CONTROLS
 from stereo_occ.data.look import check_look
@@ -64,6 +65,7 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
         *(_control(cfg) if cfg.control is not None else []),
         *_at_least(1, cfg, "views", "points", "batch_size", "mesh_resolution", "surface_points"),
         *_at_least(0, cfg, "meshes", "examples", "workers"),
+        *beyond_cores("workers", cfg.workers),
         *_known("subset", cfg.subset, (*SUBSETS, "all", "auto")),
         *_hardware(cfg),
     ]
@@ -92,6 +94,7 @@ def _slice(cfg: DictConfig) -> Iterator[str]:
 def _objects(cfg: DictConfig) -> Iterator[str]:
     yield from _at_least(1, cfg, "data.views", "data.image_side", "data.pool_size")
     yield from _at_least(0, cfg, "data.seed", "workers")
+    yield from beyond_cores("workers", cfg.workers)
     if cfg.data.image_side > LARGEST_SIDE:
         yield f"data.image_side={cfg.data.image_side}: must be at most {LARGEST_SIDE} pixels, which OpenGL can draw"
     names = list(cfg.categories.names)
@@ -270,18 +273,27 @@ def _logger(cfg: DictConfig) -> Iterator[str]:
 def _hardware(cfg: DictConfig) -> Iterator[str]:
     trainer = cfg.trainer
     yield from _at_least(0, cfg, "trainer.workers")
+    yield from beyond_cores("trainer.workers", trainer.workers)
     if trainer.threads is not None:
         yield from _at_least(1, cfg, "trainer.threads")
+        yield from beyond_cores("trainer.threads", trainer.threads)
     yield from _known("trainer.precision", trainer.precision, PRECISIONS)
     yield from _known("trainer.accelerator", trainer.accelerator, ACCELERATORS)
     if trainer.accelerator == "gpu" and not torch.cuda.is_available():
         yield "trainer.accelerator=gpu: PyTorch sees no GPU here; say trainer=cpu"
+    elif trainer.precision == "16-mixed" and not _on_gpu(trainer.accelerator):
+        yield "trainer.precision=16-mixed: processors have no half precision; say bf16-mixed or 32-true"
+
+
+def _on_gpu(accelerator: str) -> bool:
+    return accelerator == "gpu" or (accelerator == "auto" and torch.cuda.is_available())
 
 
 def _processes(cfg: DictConfig) -> Iterator[str]:
     devices, nodes = cfg.trainer.devices, cfg.trainer.nodes
     few = list(_at_least(1, cfg, "trainer.devices", "trainer.nodes"))
     yield from few
+    yield from beyond_cores("trainer.devices", devices)
     if not few and cfg.batch_size % (devices * nodes):
         yield f"batch_size={cfg.batch_size}: must be a multiple of the {devices * nodes} processes that share a batch"
     if not few and nodes > 1 and not started_elsewhere():

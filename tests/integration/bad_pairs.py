@@ -283,5 +283,7 @@ SETTINGS = [
     Case("a size of NaN", r"size=nan: must be metres above 0", ["size=nan"]),
     Case("a negative size", r"size=-0\.1: must be metres above 0", ["size=-0.1"]),
     Case("an unknown frame", r"frame=world: must be one of left, rig", ["frame=world"]),
+    Case("threads beyond counting", r"threads=100000: must be at most \d+, 16 for each core; this machine has \d",
+         ["threads=100000"]),
     Case("threads below one", r"threads=0: must be at least 1", ["threads=0"]),
 ]  # fmt: skip

@@ -1,5 +1,7 @@
 """What a well-typed configuration can still get wrong: each problem names the key, its value and a way out."""
 
+import os
+
 import pytest
 import torch
 import yaml
@@ -14,6 +16,11 @@ from stereo_occ.problems import find_problems
 @pytest.fixture(scope="module")
 def valid():
     return compose_config("train")
+
+
+@pytest.fixture
+def four_cores(monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
 
 
 @pytest.mark.parametrize(
@@ -70,6 +77,17 @@ def valid():
         ("trainer.devices=3", "batch_size=16: must be a multiple of the 3 processes"),
         ("trainer.nodes=2", "trainer.nodes=2: processes on several machines"),
         ("trainer.threads=0", "trainer.threads=0: must be at least 1"),
+        (
+            "trainer.threads=100000",
+            "trainer.threads=100000: must be at most 64, 16 for each core; this machine has 4",
+        ),
+        ("trainer.workers=100000", "trainer.workers=100000: must be at most 64"),
+        ("workers=100000", "workers=100000: must be at most 64"),
+        ("trainer.devices=65 batch_size=65", "trainer.devices=65: must be at most 64"),
+        (
+            "trainer.precision=16-mixed",
+            "trainer.precision=16-mixed: processors have no half precision; say bf16-mixed",
+        ),
         ("trainer.gradient_clip=-1", "trainer.gradient_clip=-1.0: must be above 0"),
         ("logger.mesh_resolution=0", "logger.mesh_resolution=0: must be at least 1"),
         ("model.encoder.name=foo", "model.encoder: unknown 'foo'"),
@@ -87,7 +105,7 @@ def valid():
         ("control.degrees=2", "control.degrees=2.0: control=none turns no camera; leave it at 0"),
     ],
 )
-def test_a_problem_of_a_training(valid, overrides, expected):
+def test_a_problem_of_a_training(valid, four_cores, overrides, expected):
     cfg = valid.copy()
     for override in overrides.split():
         key, _, value = override.partition("=")
@@ -168,12 +186,15 @@ def test_rendering_needs_no_division_into_subsets():
         ("mesh_resolution=0", "mesh_resolution=0: must be at least 1"),
         ("examples=-1", "examples=-1: must be at least 0"),
         ("meshes=-1", "meshes=-1: must be at least 0"),
+        ("workers=100000", "workers=100000: must be at most 64"),
+        ("trainer.threads=100000", "trainer.threads=100000: must be at most 64"),
+        ("trainer.precision=16-mixed", "trainer.precision=16-mixed: processors have no half precision"),
         ("training=['scale=smoke']", "training=['scale=smoke']: the checkpoint says what it was trained on"),
         ("control=calibration_off_1 control.degrees=-1", "control.degrees=-1.0: must be above 0"),
         ("checkpoint=nowhere.ckpt", "checkpoint=nowhere.ckpt: no such file; give the path of a .ckpt"),
     ],
 )
-def test_a_problem_of_an_evaluation(tmp_path, override, expected):
+def test_a_problem_of_an_evaluation(tmp_path, four_cores, override, expected):
     (tmp_path / "best.ckpt").touch()
     overrides = [f"checkpoint={tmp_path / 'best.ckpt'}", *override.split()]
     (problem,) = find_problems("evaluate", overrides, check_evaluation)
