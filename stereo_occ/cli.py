@@ -83,18 +83,18 @@ def entry_point(
             arguments = get_args_parser().parse_args()
             try:
                 load_extensions()
-                if not any(getattr(arguments, name) for name in ONLY_SHOWS):
-                    problems = _refused_flags(arguments) or _missing_launchers(arguments.overrides)
-                    problems = problems or find_problems(
-                        arguments.config_name or config_name,
-                        arguments.overrides,
-                        check,
-                        multirun=arguments.multirun,
-                        config_dir=Path(arguments.config_dir) if arguments.config_dir else None,
-                    )
-                    if problems:
-                        _report([_by_alias(problem, aliases or {}) for problem in problems])
-                        raise SystemExit(2)
+                shows = any(getattr(arguments, name) for name in ONLY_SHOWS)
+                problems = _refused_flags(arguments) or _missing_launchers(arguments.overrides)
+                problems = problems or find_problems(
+                    config_name,
+                    arguments.overrides,
+                    None if shows else check,
+                    multirun=arguments.multirun,
+                    config_dir=Path(arguments.config_dir) if arguments.config_dir else None,
+                )
+                if problems:
+                    _report([_by_alias(problem, aliases or {}) for problem in problems])
+                    raise SystemExit(2)
                 with _errors_raised():
                     run_hydra()
             except Exception as error:
@@ -139,17 +139,26 @@ def _runs_elsewhere() -> bool:
 
 
 def _refused_flags(arguments: Namespace) -> list[str]:
-    """Of Hydra's flags, those that would leave out the checks or run code that a file holds."""
+    """Of Hydra's flags, those that would leave out the checks or run code that a file holds, or that name nothing."""
     flags = {
         "--config-path": (
             arguments.config_path,
             "the settings are this package's own; add yours with --config-dir",
+        ),
+        "--config-name": (
+            arguments.config_name,
+            "each program has its own settings; add yours with --config-dir",
         ),
         "--experimental-rerun": (
             arguments.experimental_rerun,
             "a pickled job can run any code; type the command",
         ),
     }
+    if arguments.config_dir and not Path(arguments.config_dir).is_dir():
+        flags["--config-dir"] = (
+            arguments.config_dir,
+            "no such folder; give one such as DIR of DIR/experiment/mine.yaml",
+        )
     return [f"{flag} {value}: {remedy}" for flag, (value, remedy) in flags.items() if value]
 
 
