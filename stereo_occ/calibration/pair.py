@@ -70,13 +70,6 @@ class RealCamera:
         Raises:
             UserError: if they are of another shape, or focal length or principal point say that the size is not theirs.
         """
-        across = max(self.size or (width, height))
-        for focal in (self.K[0, 0], self.K[1, 1]):
-            if not FOCAL_LENGTHS[0] <= focal / across <= FOCAL_LENGTHS[1]:
-                raise UserError(
-                    f"rig: the {name} camera has a focal length of {focal:g} pixels, which is no lens's for images of "
-                    f"{across} pixels; check K: its lengths are in pixels"
-                )
         low, high = (
             (0.25, 0.75) if self.size is None else (-0.5, 1.5)
         )  # a part of an image may have it outside
@@ -91,6 +84,13 @@ class RealCamera:
                 f"rig: {where}, but its image has {width} x {height} pixels; "
                 f"if it was calibrated at another size, add image_width and image_height to the file"
             )
+        across = max(self.size or (width, height))
+        for focal in (self.K[0, 0], self.K[1, 1]):
+            if not FOCAL_LENGTHS[0] <= focal / across <= FOCAL_LENGTHS[1]:
+                raise UserError(
+                    f"rig: the {name} camera has a focal length of {focal:g} pixels, which is no lens's for images of "
+                    f"{across} pixels; check K: its lengths are in pixels"
+                )
         if self.size is None:
             return replace(self, size=(width, height))
         scale_2 = np.array([width, height]) / self.size
