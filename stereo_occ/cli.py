@@ -21,9 +21,11 @@ from stereo_occ.config import register_schemas
 from stereo_occ.errors import UserError
 from stereo_occ.models.extension import load_extensions
 from stereo_occ.paths import conf_dir
+from stereo_occ.printable import printable
 from stereo_occ.problems import Check, find_problems
 from stereo_occ.run_folder import remove_traces
 from stereo_occ.system_errors import one_line
+from stereo_occ.watched_output import watched_output
 
 # With these Hydra shows something and runs no job.
 ONLY_SHOWS = ("help", "hydra_help", "cfg", "info", "shell_completion")
@@ -57,6 +59,11 @@ def entry_point(
     def decorate(task: Callable[[DictConfig], object]) -> Callable[[], None]:
         failures: list[str] = []
 
+        def refuse(problem: str) -> None:
+            if problem not in failures:
+                failures.append(problem)
+                _report([problem])
+
         @functools.wraps(task)
         def guarded(cfg: DictConfig) -> object:
             register_schemas()  # a launcher's process does not know them yet
@@ -68,8 +75,7 @@ def entry_point(
                 remove_traces(Path(HydraConfig.get().runtime.output_dir))
                 if _runs_elsewhere():
                     raise UserError(problem) from error  # Hydra brings it back to the process of the sweep
-                failures.append(problem)
-                _report([problem])
+                refuse(problem)
                 return None
 
         register_schemas()
@@ -95,11 +101,10 @@ def entry_point(
                 if problems:
                     _report([_by_alias(problem, aliases or {}) for problem in problems])
                     raise SystemExit(2)
-                with _errors_raised():
+                with _errors_raised(), watched_output(refuse):
                     run_hydra()
             except Exception as error:
-                failures.append(one_line(error))
-                _report(failures[-1:])
+                refuse(one_line(error))
             if failures:
                 raise SystemExit(2)
 
@@ -187,4 +192,4 @@ def _errors_raised() -> Iterator[None]:
 
 def _report(problems: Sequence[str]) -> None:
     for problem in problems:
-        sys.stderr.write(f"stereo_occ: {problem}\n")
+        sys.stderr.write(f"stereo_occ: {printable(problem)}\n")

@@ -21,6 +21,7 @@ REMEDIES = {
     errno.EISDIR: "choose another name",
     errno.EMFILE: "raise the limit on open files (ulimit -n)",
     errno.ENFILE: "close other programs",
+    errno.EPIPE: "let it be read to its end",
 }
 
 #: How torch begins what it raises where there is no memory.

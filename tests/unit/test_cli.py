@@ -269,6 +269,27 @@ def test_a_failure_in_another_process_of_a_sweep_ends_it_with_its_line(tmp_path)
     assert sorted(line for line in run.stdout.splitlines() if line.startswith("ran")) == ["ran 0", "ran 2"]
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a file of Linux that is always full")
+@pytest.mark.parametrize(
+    "program", [PROGRAM.replace("print(", "__import__('logging').getLogger('x').info('%s %s', "), PROGRAM]
+)
+def test_output_that_cannot_be_written_is_one_line(tmp_path, program):
+    (tmp_path / "program.py").write_text(program)
+    with Path("/dev/full").open("w") as full:
+        run = subprocess.run(
+            [sys.executable, "program.py"],
+            cwd=tmp_path,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+    assert run.returncode == 2
+    assert len(run.stderr.splitlines()) == 1, run.stderr
+    assert run.stderr.endswith("No space left on device; free some disk space\n")
+
+
 def test_a_launcher_that_is_not_installed_is_one_line(monkeypatch, capsys):
     monkeypatch.setitem(cli.LAUNCHERS, "joblib", "no_such_package")
     monkeypatch.setattr(sys, "argv", ["train", "-m", "hydra/launcher=joblib", "seed=0,1"])
