@@ -10,10 +10,11 @@ import torch
 from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.baselines.config import baseline_problems
+from stereo_occ.cores import beyond_cores
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.controls import CONTROLS
 from stereo_occ.data.look import check_look
-from stereo_occ.data.rigs import RigConfig, ToedInRigConfig, build_rig
+from stereo_occ.data.rigs import DISTANCE, FOV, HALF_ANGLE, RigConfig, ToedInRigConfig, build_rig
 from stereo_occ.data.scene import draw_scene
 from stereo_occ.data.splits import SUBSETS, split_views, subset_sizes
 from stereo_occ.errors import UserError
@@ -28,6 +29,10 @@ from stereo_occ.shapes.shape import CATEGORIES
 ACCELERATORS = ("cpu", "gpu", "auto")
 PRECISIONS = ("32-true", "bf16-mixed", "16-mixed")
 LARGEST_SIDE = 4096
+
+#: Of meshes per side of the cube and of samples, which have to be held in memory.
+MOST_CELLS = 512
+MOST_POINTS = 10_000_000
 LOOKS = ("lights", "material", "texture", "background", "sensor")
 
 
@@ -64,6 +69,9 @@ def check_evaluation(cfg: DictConfig) -> list[str]:
         *(_control(cfg) if cfg.control is not None else []),
         *_at_least(1, cfg, "views", "points", "batch_size", "mesh_resolution", "surface_points"),
         *_at_least(0, cfg, "meshes", "examples", "workers"),
+        *_at_most(MOST_CELLS, cfg, "mesh_resolution"),
+        *_at_most(MOST_POINTS, cfg, "points", "surface_points"),
+        *beyond_cores("workers", cfg.workers),
         *_known("subset", cfg.subset, (*SUBSETS, "all", "auto")),
         *_hardware(cfg),
     ]
@@ -91,12 +99,16 @@ def _slice(cfg: DictConfig) -> Iterator[str]:
 
 def _objects(cfg: DictConfig) -> Iterator[str]:
     yield from _at_least(1, cfg, "data.views", "data.image_side", "data.pool_size")
+    yield from _at_most(MOST_POINTS, cfg, "data.pool_size")
     yield from _at_least(0, cfg, "data.seed", "workers")
+    yield from beyond_cores("workers", cfg.workers)
     if cfg.data.image_side > LARGEST_SIDE:
         yield f"data.image_side={cfg.data.image_side}: must be at most {LARGEST_SIDE} pixels, which OpenGL can draw"
     names = list(cfg.categories.names)
     for name in names:
         yield from _known("categories.names", name, CATEGORIES)
+    if len(set(names)) < len(names):
+        yield f"categories.names={names}: names a category twice; name each once"
     if not names:
         yield f"categories.names=[]: names no category; name at least one of {', '.join(CATEGORIES)}"
     if cfg.data.name == "procedural":
@@ -138,9 +150,9 @@ def _placement(cfg: DictConfig) -> Iterator[str]:
 def _rig(cfg: DictConfig) -> Iterator[str]:
     if cfg.rig.kind != ToedInRigConfig.kind:
         return  # drawing a scene tells
-    for key, upper in (("distance", inf), ("half_angle_deg", 90), ("fov_deg", 180)):
-        if not 0 < cfg.rig[key] < upper:
-            yield f"rig.{key}={cfg.rig[key]}: must be above 0 and below {upper}"
+    for key, (least, most) in (("distance", DISTANCE), ("half_angle_deg", HALF_ANGLE), ("fov_deg", FOV)):
+        if not least <= cfg.rig[key] <= most:
+            yield f"rig.{key}={cfg.rig[key]}: must be {least:g} to {most:g}"
 
 
 def _scene(cfg: DictConfig) -> Iterator[str]:
@@ -246,6 +258,7 @@ def _reads_cameras(model: DictConfig) -> bool:
 
 def _settings(cfg: DictConfig) -> Iterator[str]:
     yield from _at_least(1, cfg, "points", "batch_size", "logger.interval", "logger.mesh_resolution")
+    yield from _at_most(MOST_CELLS, cfg, "logger.mesh_resolution")
     yield from _at_least(0, cfg, "seed", "scheduler.warmup", "logger.examples", "optimizer.weight_decay")
     for key in ("points", "validation.points"):
         if _value(cfg, key) > cfg.data.pool_size:
@@ -281,18 +294,27 @@ def _logger(cfg: DictConfig) -> Iterator[str]:
 def _hardware(cfg: DictConfig) -> Iterator[str]:
     trainer = cfg.trainer
     yield from _at_least(0, cfg, "trainer.workers")
+    yield from beyond_cores("trainer.workers", trainer.workers)
     if trainer.threads is not None:
         yield from _at_least(1, cfg, "trainer.threads")
+        yield from beyond_cores("trainer.threads", trainer.threads)
     yield from _known("trainer.precision", trainer.precision, PRECISIONS)
     yield from _known("trainer.accelerator", trainer.accelerator, ACCELERATORS)
     if trainer.accelerator == "gpu" and not torch.cuda.is_available():
         yield "trainer.accelerator=gpu: PyTorch sees no GPU here; say trainer=cpu"
+    elif trainer.precision == "16-mixed" and not _on_gpu(trainer.accelerator):
+        yield "trainer.precision=16-mixed: processors have no half precision; say bf16-mixed or 32-true"
+
+
+def _on_gpu(accelerator: str) -> bool:
+    return accelerator == "gpu" or (accelerator == "auto" and torch.cuda.is_available())
 
 
 def _processes(cfg: DictConfig) -> Iterator[str]:
     devices, nodes = cfg.trainer.devices, cfg.trainer.nodes
     few = list(_at_least(1, cfg, "trainer.devices", "trainer.nodes"))
     yield from few
+    yield from beyond_cores("trainer.devices", devices)
     if not few and cfg.batch_size % (devices * nodes):
         yield f"batch_size={cfg.batch_size}: must be a multiple of the {devices * nodes} processes that share a batch"
     if not few and nodes > 1 and not started_elsewhere():
@@ -303,6 +325,12 @@ def _at_least(minimum: int, cfg: DictConfig, *keys: str) -> Iterator[str]:
     for key in keys:
         if _value(cfg, key) < minimum:
             yield f"{key}={_value(cfg, key)}: must be at least {minimum}"
+
+
+def _at_most(maximum: int, cfg: DictConfig, *keys: str) -> Iterator[str]:
+    for key in keys:
+        if _value(cfg, key) > maximum:
+            yield f"{key}={_value(cfg, key)}: must be at most {maximum}"
 
 
 def _known(key: str, value: str, known: Sequence[str] | dict[str, Any]) -> Iterator[str]:

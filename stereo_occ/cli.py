@@ -21,9 +21,11 @@ from stereo_occ.config import register_schemas
 from stereo_occ.errors import UserError
 from stereo_occ.models.extension import load_extensions
 from stereo_occ.paths import conf_dir
+from stereo_occ.printable import printable
 from stereo_occ.problems import Check, find_problems
 from stereo_occ.run_folder import remove_traces
 from stereo_occ.system_errors import one_line
+from stereo_occ.watched_output import watched_output
 
 # With these Hydra shows something and runs no job.
 ONLY_SHOWS = ("help", "hydra_help", "cfg", "info", "shell_completion")
@@ -57,6 +59,11 @@ def entry_point(
     def decorate(task: Callable[[DictConfig], object]) -> Callable[[], None]:
         failures: list[str] = []
 
+        def refuse(problem: str) -> None:
+            if problem not in failures:
+                failures.append(problem)
+                _report([problem])
+
         @functools.wraps(task)
         def guarded(cfg: DictConfig) -> object:
             register_schemas()  # a launcher's process does not know them yet
@@ -68,8 +75,7 @@ def entry_point(
                 remove_traces(Path(HydraConfig.get().runtime.output_dir))
                 if _runs_elsewhere():
                     raise UserError(problem) from error  # Hydra brings it back to the process of the sweep
-                failures.append(problem)
-                _report([problem])
+                refuse(problem)
                 return None
 
         register_schemas()
@@ -83,23 +89,22 @@ def entry_point(
             arguments = get_args_parser().parse_args()
             try:
                 load_extensions()
-                if not any(getattr(arguments, name) for name in ONLY_SHOWS):
-                    problems = _refused_flags(arguments) or _missing_launchers(arguments.overrides)
-                    problems = problems or find_problems(
-                        arguments.config_name or config_name,
-                        arguments.overrides,
-                        check,
-                        multirun=arguments.multirun,
-                        config_dir=Path(arguments.config_dir) if arguments.config_dir else None,
-                    )
-                    if problems:
-                        _report([_by_alias(problem, aliases or {}) for problem in problems])
-                        raise SystemExit(2)
-                with _errors_raised():
+                shows = any(getattr(arguments, name) for name in ONLY_SHOWS)
+                problems = _refused_flags(arguments) or _missing_launchers(arguments.overrides)
+                problems = problems or find_problems(
+                    config_name,
+                    arguments.overrides,
+                    None if shows else check,
+                    multirun=arguments.multirun,
+                    config_dir=Path(arguments.config_dir) if arguments.config_dir else None,
+                )
+                if problems:
+                    _report([_by_alias(problem, aliases or {}) for problem in problems])
+                    raise SystemExit(2)
+                with _errors_raised(), watched_output(refuse):
                     run_hydra()
             except Exception as error:
-                failures.append(one_line(error))
-                _report(failures[-1:])
+                refuse(one_line(error))
             if failures:
                 raise SystemExit(2)
 
@@ -139,17 +144,26 @@ def _runs_elsewhere() -> bool:
 
 
 def _refused_flags(arguments: Namespace) -> list[str]:
-    """Of Hydra's flags, those that would leave out the checks or run code that a file holds."""
+    """Of Hydra's flags, those that would leave out the checks or run code that a file holds, or that name nothing."""
     flags = {
         "--config-path": (
             arguments.config_path,
             "the settings are this package's own; add yours with --config-dir",
+        ),
+        "--config-name": (
+            arguments.config_name,
+            "each program has its own settings; add yours with --config-dir",
         ),
         "--experimental-rerun": (
             arguments.experimental_rerun,
             "a pickled job can run any code; type the command",
         ),
     }
+    if arguments.config_dir and not Path(arguments.config_dir).is_dir():
+        flags["--config-dir"] = (
+            arguments.config_dir,
+            "no such folder; give one such as DIR of DIR/experiment/mine.yaml",
+        )
     return [f"{flag} {value}: {remedy}" for flag, (value, remedy) in flags.items() if value]
 
 
@@ -178,4 +192,4 @@ def _errors_raised() -> Iterator[None]:
 
 def _report(problems: Sequence[str]) -> None:
     for problem in problems:
-        sys.stderr.write(f"stereo_occ: {problem}\n")
+        sys.stderr.write(f"stereo_occ: {printable(problem)}\n")

@@ -76,7 +76,9 @@ def _metrics(path: str | None, run: Path) -> dict[str, Any]:
         return {}
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-        metrics: dict[str, Any] = content["metrics"] if "metrics" in content else content["best"]
+        metrics = content["metrics"] if "metrics" in content else content["best"]
+        if not isinstance(metrics, dict):
+            raise TypeError("metrics have names")
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise UserError(f"metrics={file}: cannot be read; give the metrics.json of an evaluation") from error
     return metrics

@@ -15,6 +15,7 @@ from stereo_occ.data.objects import list_objects
 from stereo_occ.errors import UserError
 from stereo_occ.quality_report import write_quality_report
 from stereo_occ.quiet import quiet_libraries
+from stereo_occ.shapes.layouts import LAYOUT
 
 logger = logging.getLogger(__name__)
 
@@ -30,6 +31,10 @@ def main(cfg: DictConfig) -> None:
     objects = list_objects(pairs, pairs.progress)
     for file in objects.skipped:
         logger.warning("left out %s: %s", file.path, file.reason)
+    if not objects.records:
+        raise UserError(
+            f"data.root={pairs.data.root}: holds no mesh of {', '.join(pairs.categories.names)}; lay it out as {LAYOUT}"
+        )
     folder = Path(HydraConfig.get().runtime.output_dir)
     write_quality_report(folder, objects.records, Path(pairs.data.root), pairs.progress)
     for status, count in Counter(record.outcome.status for record in objects.records).items():

@@ -1,6 +1,6 @@
 """What is wrong with a command line: every problem at once, one line each with the key, its value and a remedy."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import fields, is_dataclass
@@ -26,7 +26,11 @@ from omegaconf import (
     StringNode,
     open_dict,
 )
-from omegaconf.errors import InterpolationKeyError, OmegaConfBaseException
+from omegaconf.errors import (
+    InterpolationKeyError,
+    InterpolationToMissingValueError,
+    OmegaConfBaseException,
+)
 from yaml import YAMLError
 
 from stereo_occ.config import register_schemas
@@ -38,8 +42,14 @@ Check = Callable[[DictConfig], list[str]]
 #: From overrides to the configuration, Hydra's own part included; for the same overrides the same object.
 Compositions = Callable[[tuple[str, ...]], DictConfig]
 
-# Hydra itself raises ValueError for a group without a choice: model=null; YAMLError comes from files of one's own.
-COMPOSITION_ERRORS = (HydraException, OmegaConfBaseException, ValueError, YAMLError)
+# Hydra itself raises ValueError for a group without a choice: model=null; OmegaConf AssertionError for a key below a
+# group of which there is none: control.degrees=3; YAMLError comes from files of one's own.
+COMPOSITION_ERRORS = (HydraException, OmegaConfBaseException, ValueError, AssertionError, YAMLError)
+
+#: Whole numbers are at most this: seeds have 32 bits, and nothing that is counted is as many.
+LARGEST = 2**32 - 1
+
+NO_SUCH_KEY = "refers to a key that does not exist"
 
 #: Where files of one's own are.
 SEARCHPATH = "hydra.searchpath"
@@ -59,7 +69,7 @@ def _composing() -> Iterator[None]:
 def find_problems(
     config_name: str,
     overrides: Sequence[str],
-    check: Check,
+    check: Check | None,
     multirun: bool = True,
     config_dir: Path | None = None,
 ) -> list[str]:
@@ -70,7 +80,7 @@ def find_problems(
     Args:
         config_name: file in ``conf/``, without its suffix.
         overrides: as on the command line.
-        check: what a composed configuration must satisfy.
+        check: what a composed configuration must satisfy; None: nothing, not even that all values are given.
         multirun: whether several values are allowed.
         config_dir: searched for groups beside ``conf/``.
     """
@@ -86,7 +96,7 @@ def find_problems(
                 continue
             try:
                 choices = _choices(OverridesParser.create().parse_override(override))
-            except HydraException:
+            except (HydraException, ValueError):  # ValueError: thousands of digits
                 choices = []
             if not choices or not _key(override):
                 problems.append(
@@ -156,12 +166,16 @@ def _choices(override: Override) -> list[str]:
 
 
 def _problems_of_job(
-    config_name: str, composed: Compositions, overrides: list[str], check: Check
+    config_name: str, composed: Compositions, overrides: list[str], check: Check | None
 ) -> list[str]:
     try:
         cfg = deepcopy(composed(tuple(overrides)))
     except COMPOSITION_ERRORS as error:
         return _problems_one_by_one(config_name, overrides) or [_one_line(error)]
+    nodes, given = _nodes(cfg), set(map(_key, overrides))
+    values = [*_of_given(_unresolved(nodes, given), given), *_of_given(_too_large(nodes), given)]
+    if check is None:
+        return values
     with open_dict(cfg):
         del cfg["hydra"]
     nodes = _nodes(cfg)
@@ -170,14 +184,49 @@ def _problems_of_job(
     known = [field.name for field in fields(schema)]
     problems = [f"{key}: {_unknown(key, known)}" for key in map(str, cfg) if key not in known]
     problems += [f"{key}: no value given; add {key}=..." for key, node in nodes.items() if node._is_missing()]
-    if problems:
-        return problems
+    if problems or values:
+        return [*problems, *values]
     try:
         return check(cfg)
     except InterpolationKeyError as error:
-        return [
-            f"{error.full_key}={nodes[str(error.full_key)]._value()}: refers to a key that does not exist"
-        ]
+        return [f"{error.full_key}={nodes[str(error.full_key)]._value()}: {NO_SUCH_KEY}"]
+
+
+def _of_given(problems: Mapping[str, str], given: Container[str]) -> list[str]:
+    """Of problems by key those of the keys that were given: other keys refer to these."""
+    return [problem for key, problem in problems.items() if key in given] or list(problems.values())
+
+
+def _unresolved(nodes: Mapping[str, Node], given: Container[str]) -> dict[str, str]:
+    """Values that refer to something that is not there, by key.
+
+    A key that does not exist counts where the reference was given: that of a group may refer to a checkpoint's.
+    """
+    problems: dict[str, str] = {}
+    for key, node in nodes.items():
+        # Hydra's own references can be followed only while a job runs.
+        if not node._is_interpolation() or "${hydra:" in str(node._value()):
+            continue
+        try:
+            node._dereference_node()
+        except InterpolationToMissingValueError:
+            continue
+        except InterpolationKeyError:
+            if key in given:
+                problems[key] = f"{key}={node._value()}: {NO_SUCH_KEY}"
+        except OmegaConfBaseException as error:
+            reason = str(error).splitlines()[0].rpartition("interpolation: ")[2].strip('"')
+            problems[key] = f"{key}={node._value()}: cannot be resolved ({reason}); give a value"
+    return problems
+
+
+def _too_large(nodes: Mapping[str, Node]) -> dict[str, str]:
+    """Whole numbers beyond what anything here can count, by key."""
+    return {
+        key: f"{key}={node._value()}: must be at most {LARGEST}"
+        for key, node in nodes.items()
+        if isinstance(node._value(), int) and node._value() > LARGEST
+    }
 
 
 def _problems_one_by_one(config_name: str, overrides: list[str]) -> list[str]:
@@ -199,7 +248,13 @@ def _problems_one_by_one(config_name: str, overrides: list[str]) -> list[str]:
         except COMPOSITION_ERRORS as error:
             key, _, value = override.partition("=")
             node = known.get(_key(override))
-            if node is None:
+            group = _key(override).partition(".")[0]
+            if node is None and group in known and known[group]._is_none():
+                options = ", ".join(_options(group))
+                problems.append(
+                    f"{override}: there is no {group} to change; say {group}=..., one of {options}"
+                )
+            elif node is None:
                 problems.append(f"{_key(override)}: {_unknown(_key(override), known)}")
             elif key.startswith("+") and not key.startswith("++"):
                 problems.append(f"{override}: the key exists already; write {override[1:]}")
@@ -212,8 +267,7 @@ def _problems_one_by_one(config_name: str, overrides: list[str]) -> list[str]:
 
 def _problem_of_group(config_name: str, override: str, good: list[str], error: Exception) -> str:
     key, _, value = override.partition("=")
-    options = GlobalHydra.instance().config_loader().get_group_options(_key(override))
-    options = [option for option in options if not option.startswith("base_")]
+    options = _options(_key(override))
     of_ones_own = any(_key(override) == SEARCHPATH for override in good) and not (
         isinstance(error, MissingConfigException) and error.missing_cfg_file == f"{_key(override)}/{value}"
     )
@@ -227,6 +281,12 @@ def _problem_of_group(config_name: str, override: str, good: list[str], error: E
         return f"{override}: {owner}={choices[owner]} has no {part}; leave it out or choose another {owner}"
     groups = ", ".join(sorted(group for group in choices if "/" not in group))
     return f"{override}: {config_name} has no group {key}; its groups are {groups}"
+
+
+def _options(group: str) -> list[str]:
+    """What can be chosen of a group."""
+    options = GlobalHydra.instance().config_loader().get_group_options(group)
+    return [option for option in options if not option.startswith("base_")]
 
 
 def _key(override: str) -> str:

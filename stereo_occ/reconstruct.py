@@ -11,6 +11,7 @@ from PIL import Image
 
 from stereo_occ import __version__
 from stereo_occ.cli import entry_point
+from stereo_occ.cores import beyond_cores
 from stereo_occ.inference_config import Frame, ReconstructConfig
 from stereo_occ.mesh_output import FORMATS, write_mesh
 from stereo_occ.quiet import quiet_libraries
@@ -37,8 +38,10 @@ def check_reconstruction(cfg: DictConfig) -> list[str]:
         problems.append(f"steps={cfg.steps}: must be 0 to 20")
     if cfg.simplify is not None and not 0 < cfg.simplify < 1:
         problems.append(f"simplify={cfg.simplify}: must be metres above 0, such as 0.0005")
-    if cfg.threads is not None and cfg.threads < 1:
-        problems.append(f"threads={cfg.threads}: must be at least 1")
+    if cfg.threads is not None:
+        problems += beyond_cores("threads", cfg.threads)
+        if cfg.threads < 1:
+            problems.append(f"threads={cfg.threads}: must be at least 1")
     return problems
 
 

@@ -22,6 +22,7 @@ REMEDIES = {
     errno.ELOOP: "choose another folder",
     errno.EMFILE: "raise the limit on open files (ulimit -n)",
     errno.ENFILE: "close other programs",
+    errno.EPIPE: "let it be read to its end",
 }
 
 #: How torch begins what it raises where there is no memory.

@@ -16,9 +16,10 @@ from stereo_occ.checkpoint import build_task, plain
 from stereo_occ.checks import check_training
 from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
-from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.data.datamodule import NO_OBJECTS, PairsDataModule
 from stereo_occ.data.objects import training_objects
 from stereo_occ.divergence import StopIfDiverged
+from stereo_occ.errors import UserError
 from stereo_occ.group import is_first, run_in_processes, started_elsewhere
 from stereo_occ.loggers.board import Board
 from stereo_occ.loggers.build import build_boards
@@ -49,6 +50,9 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
     latest = folder / "last.ckpt"
     resume = typed.resume is Resume.auto and latest.exists()
     objects = training_objects(typed, typed.progress and is_first())
+    for subset, names in objects.items():
+        if not names:
+            raise UserError(f"data.name={typed.data.name}: {NO_OBJECTS.format(subset)}")
     step = step_to_resume(latest, plain(cfg), objects) if resume else 0
     lightning.seed_everything(typed.seed, verbose=False)
     task = build_task(cfg, load_weights=not resume and typed.init is None, objects=objects)

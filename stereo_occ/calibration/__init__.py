@@ -1,7 +1,6 @@
 """Calibrations of real cameras, from files."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +67,7 @@ def metres_per_unit(unit: str | float | None, values: Mapping[str, Any]) -> floa
         metres = float(unit)
     except (TypeError, ValueError):
         metres = 0.0
-    if not (metres > 0 and isfinite(metres)):
+    if not 1e-9 <= metres <= 1000:
         raise UserError(
             f"unit={unit}: must be one of {', '.join(UNITS)} or metres as a number, such as 0.025"
         )

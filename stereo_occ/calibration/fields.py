@@ -19,6 +19,10 @@ MOST_BYTES = 1_000_000
 MOST_NUMBERS = 1000
 
 
+#: Of the numbers in a calibration, whatever their unit.
+LARGEST = 1e9
+
+
 class _Loader(yaml.SafeLoader):
     """Plain values, and OpenCV's tagged ones as what they hold."""
 
@@ -99,10 +103,15 @@ class Fields:
             if len(list(islice(_leaves(value), MOST_NUMBERS + 1))) > MOST_NUMBERS:
                 raise ValueError
             numbers = np.asarray(value, dtype=object).astype(np.float64)
-            return numbers if shape is None else numbers.reshape(shape)
+            numbers = numbers if shape is None else numbers.reshape(shape)
         except (TypeError, ValueError, RecursionError) as error:
             wanted = f"{' x '.join(map(str, shape))} numbers" if shape else "numbers"
             raise UserError(f"rig={self.source}: {key} must be {wanted}, got {brief(value)}") from error
+        if (np.abs(numbers[np.isfinite(numbers)]) > LARGEST).any():
+            raise UserError(
+                f"rig={self.source}: {key} holds numbers above {LARGEST:g}, got {brief(value)}; check it"
+            )
+        return numbers
 
     def size(self) -> tuple[int, int] | None:
         """Width and height of the images, where they are given."""

@@ -17,6 +17,9 @@ DISTORTION = ("D{}", "distCoeffs{}", "dist_coeffs_{}", "dist_coeffs{}", "dist{}"
 ROS_MODELS = {"plumb_bob": False, "rational_polynomial": False, "": False, "none": False}
 ROS_MODELS |= {"equidistant": True, "fisheye": True}
 
+#: YAML's own words, and OpenCV's, whose files know numbers alone.
+YES_OR_NO = {"true": True, "1": True, "false": False, "0": False}
+
 IDEAL = Lens(np.zeros(0))
 
 
@@ -34,7 +37,9 @@ def from_opencv(fields: Fields, metres: float, rectified: bool) -> RealPair:
         return _from_projections(
             fields.array("P1", shape=(3, 4)), fields.array("P2", shape=(3, 4)), (fields.size(),) * 2, metres
         )
-    fisheye = fields.text("fisheye", "false").lower() in ("true", "1")
+    fisheye = fields.text("fisheye", "false").lower()
+    if fisheye not in YES_OR_NO:
+        raise UserError(f"rig={fields.source}: fisheye must be true or false, got {fisheye!r}")
     right_from_left = np.eye(4)
     right_from_left[:3, :3] = fields.array("R", shape=(3, 3))
     right_from_left[:3, 3] = metres * fields.array("T", shape=(3,))
@@ -43,7 +48,9 @@ def from_opencv(fields: Fields, metres: float, rectified: bool) -> RealPair:
         K = fields.array(*(name.format(index) for name in INTRINSICS), shape=(3, 3))
         distortion = fields.array(*(name.format(index) for name in DISTORTION))
         cameras.append(
-            RealCamera(K, Lens.from_list(distortion.ravel().tolist(), fisheye), pose, fields.size())
+            RealCamera(
+                K, Lens.from_list(distortion.ravel().tolist(), YES_OR_NO[fisheye]), pose, fields.size()
+            )
         )
     return RealPair(*cameras)
 

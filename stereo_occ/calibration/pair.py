@@ -15,6 +15,9 @@ BASELINES = (0.005, 3.0)
 #: Between the optical axes, degrees: more than this sees no household object from both sides.
 MOST_APART = 90.0
 
+#: Focal lengths that a camera may have, in widths of its images: views of 170 degrees to half a degree.
+FOCAL_LENGTHS = (0.04, 100.0)
+
 #: Widths and heights of an image may differ by this share from the calibration's, as a rounded division does.
 SAME_SHAPE = 0.01
 
@@ -65,7 +68,7 @@ class RealCamera:
         """The camera for images of another size, of the same shape.
 
         Raises:
-            UserError: if they are of another shape, or the principal point says that the size is not theirs.
+            UserError: if they are of another shape, or focal length or principal point say that the size is not theirs.
         """
         low, high = (
             (0.25, 0.75) if self.size is None else (-0.5, 1.5)
@@ -81,6 +84,13 @@ class RealCamera:
                 f"rig: {where}, but its image has {width} x {height} pixels; "
                 f"if it was calibrated at another size, add image_width and image_height to the file"
             )
+        across = max(self.size or (width, height))
+        for focal in (self.K[0, 0], self.K[1, 1]):
+            if not FOCAL_LENGTHS[0] <= focal / across <= FOCAL_LENGTHS[1]:
+                raise UserError(
+                    f"rig: the {name} camera has a focal length of {focal:g} pixels, which is no lens's for images of "
+                    f"{across} pixels; check K: its lengths are in pixels"
+                )
         if self.size is None:
             return replace(self, size=(width, height))
         scale_2 = np.array([width, height]) / self.size

@@ -89,8 +89,18 @@ def build_rig(config: RigConfig, side: int) -> StereoRig:
     return toed_in_rig(config.distance, radians(config.half_angle_deg), radians(config.fov_deg), side)
 
 
+#: Limits of what cameras can be for objects of at most a metre: metres, degrees, degrees.
+DISTANCE = (0.1, 100.0)
+HALF_ANGLE = (0.01, 89.0)
+FOV = (1.0, 170.0)
+
 #: Ranges of a randomised rig with their limits.
-RANDOMISED = {"distance": (0.0, np.inf), "baseline": (0.0, np.inf), "vergence": (0, 1), "fov_deg": (1, 170)}
+RANDOMISED = {
+    "distance": DISTANCE,
+    "baseline": (0.0, 2 * DISTANCE[1]),
+    "vergence": (0.0, 1.0),
+    "fov_deg": FOV,
+}
 
 
 def draw_verging(config: RandomisedRigConfig, side: int, rng: np.random.Generator) -> StereoRig:
@@ -111,8 +121,8 @@ def draw_parallel(config: RectifiedRigConfig, rng: np.random.Generator) -> Stere
     Raises:
         UserError: for a range out of its limits or an image without pixels.
     """
-    baseline = draw(config.baseline, "rig.baseline", rng, 1e-3, np.inf)
-    fov = radians(draw(config.fov_deg, "rig.fov_deg", rng, 1, 170))
+    baseline = draw(config.baseline, "rig.baseline", rng, 1e-3, 2 * DISTANCE[1])
+    fov = radians(draw(config.fov_deg, "rig.fov_deg", rng, *FOV))
     return _parallel(config, baseline, fov)
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from stereo_occ.data.placement import Placement, PlacementConfig, draw_pose, draw_standing, in_view
 from stereo_occ.data.rigs import (
+    DISTANCE,
     RandomisedRigConfig,
     RectifiedRigConfig,
     RigConfig,
@@ -141,7 +142,7 @@ def _rectified(
 ) -> Scene | None:
     """Orientations are drawn as the line of sight to the object sees them, as with the other rigs."""
     rig = draw_parallel(config, rng)
-    distance = draw(config.distance, "rig.distance", rng, 0.05, np.inf)
+    distance = draw(config.distance, "rig.distance", rng, 0.05, DISTANCE[1])
     pixel_12 = rng.uniform([[0, 0]], [[config.width, config.height]]) - 0.5
     (center_3,) = rig.left.unproject(pixel_12, np.ones(1)) - rig.left.center
     center_3 = rig.left.center + distance * center_3 / np.linalg.norm(center_3)

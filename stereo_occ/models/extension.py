@@ -11,6 +11,7 @@ from dataclasses import field, make_dataclass
 from functools import partial
 from importlib import import_module
 from inspect import Parameter, signature
+from traceback import extract_tb
 from typing import Any, TypeVar, get_type_hints
 
 from hydra.core.config_store import ConfigStore
@@ -70,17 +71,30 @@ def load_extensions() -> None:
     """Import the modules that :data:`VARIABLE` names, separated by commas.
 
     Raises:
-        UserError: one of them cannot be found.
+        UserError: one of them cannot be found, or fails when it is imported.
     """
     for name in filter(None, map(str.strip, os.environ.get(VARIABLE, "").split(","))):
         try:
             import_module(name)
-        except ModuleNotFoundError as error:
-            if error.name != name:
-                raise
+        except UserError:
+            raise
+        except Exception as error:
+            if isinstance(error, ModuleNotFoundError) and error.name == name:
+                raise UserError(
+                    f"{VARIABLE}={name}: no such module; name one in the working directory or of an installed package"
+                ) from error
             raise UserError(
-                f"{VARIABLE}={name}: no such module; name one in the working directory or of an installed package"
+                f"{VARIABLE}={name}: {_place(error)}: {type(error).__name__}: {' '.join(str(error).split())}; "
+                f"correct it, or leave the module out of {VARIABLE}"
             ) from error
+
+
+def _place(error: Exception) -> str:
+    """The file and line that an import has failed at: where a text is no Python, else the last that ran."""
+    if isinstance(error, SyntaxError):
+        return f"{error.filename}, line {error.lineno}"
+    last = extract_tb(error.__traceback__)[-1]
+    return f"{last.filename}, line {last.lineno}"
 
 
 def _register(group: str, name: str, part: Any, table: MutableMapping[str, Any], base: type) -> None:

@@ -31,6 +31,9 @@ from stereo_occ.photographs.photo import pixels_in
 #: How far a pair may be from the fixed one of a checkpoint, degrees and share of the distance.
 ANGLE, DISTANCE = 2.0, 0.05
 
+#: Metres to an object; the working cube of anything farther is less than a pixel.
+FARTHEST = 100.0
+
 
 @dataclass(frozen=True, eq=False)
 class Framing:
@@ -164,6 +167,11 @@ def _ball_box(camera: Camera, center_3: NDArray[np.float64], size: float) -> Box
         raise UserError(
             f"center={center_3.tolist()}: must be in front of the cameras, in metres of the left camera's frame "
             f"(right, down, forward)"
+        )
+    if depth > FARTHEST or not (-0.5 <= u <= camera.width - 0.5 and -0.5 <= v <= camera.height - 0.5):
+        raise UserError(
+            f"center={center_3.tolist()}: is at pixel ({u:.0f}, {v:.0f}) of an image of {camera.width} x "
+            f"{camera.height}, {depth:.3g} m away; it must be in both images and at most {FARTHEST:g} m away"
         )
     reach = camera.K[0, 0] * size / 2**1.5 / depth
     return Box(u - reach, v - reach, u + reach, v + reach)

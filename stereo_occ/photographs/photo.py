@@ -149,7 +149,7 @@ def _corners(target: Camera) -> NDArray[np.float64]:
 
 def _to_bytes(values_HW: NDArray[np.generic]) -> NDArray[np.uint8]:
     """Of 10, 12, 14 or 16 bits whichever the largest value needs; fractions are of 1."""
-    values = np.nan_to_num(values_HW.astype(np.float64))
+    values = np.nan_to_num(values_HW.astype(np.float64), posinf=0, neginf=0)
     peak = values.max(initial=0)
     if values_HW.dtype.kind == "f" and peak <= 1:
         full = 1.0

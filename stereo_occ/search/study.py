@@ -12,6 +12,7 @@ import optuna
 from optuna.distributions import BaseDistribution, distribution_to_json
 from optuna.samplers import TPESampler
 from optuna.trial import FrozenTrial, TrialState
+from sqlalchemy.exc import SQLAlchemyError
 
 from stereo_occ.errors import UserError
 from stereo_occ.search.config import SearchConfig
@@ -36,15 +37,19 @@ class Search:
         self, config: SearchConfig, space: Mapping[str, BaseDistribution], fixed: Sequence[str]
     ) -> None:
         self.config, self.space = config, dict(space)
-        if config.storage.startswith(SQLITE):
-            Path(config.storage.removeprefix(SQLITE)).parent.mkdir(parents=True, exist_ok=True)
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         try:
+            if config.storage.startswith(SQLITE):
+                Path(config.storage.removeprefix(SQLITE)).parent.mkdir(parents=True, exist_ok=True)
             self.study = optuna.create_study(
                 study_name="search", storage=config.storage, direction="maximize", load_if_exists=True
             )
-        except optuna.exceptions.StorageInternalError as error:
-            raise UserError(f"hydra.sweeper.storage={config.storage}: cannot be opened ({error})") from error
+        except (SQLAlchemyError, OSError, ImportError, optuna.exceptions.StorageInternalError) as error:
+            reason = str(error).splitlines()[0]
+            raise UserError(
+                f"hydra.sweeper.storage={config.storage}: cannot be opened ({reason}); say "
+                f"hydra.sweeper.storage=sqlite:///FILE, where no other file is"
+            ) from error
         self._keep_to({key: distribution_to_json(value) for key, value in space.items()}, fixed)
 
     def _keep_to(self, space: Mapping[str, str], fixed: Sequence[str]) -> None:
@@ -80,7 +85,8 @@ class Search:
     def _ask(self) -> int:
         number = len(self.trials)
         self.study.sampler = TPESampler(
-            n_startup_trials=self.config.n_startup_trials, seed=1_000_003 * self.config.seed + number
+            n_startup_trials=self.config.n_startup_trials,
+            seed=(1_000_003 * self.config.seed + number) % 2**32,  # NumPy's seeds have 32 bits
         )
         return self.study.ask(fixed_distributions=self.space).number
 

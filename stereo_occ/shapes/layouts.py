@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from pathlib import Path, PurePath
 
 from stereo_occ.errors import UserError
+from stereo_occ.printable import printable
 from stereo_occ.shapes.shape import CATEGORIES
 
 SUBSETS = ("train", "val", "test")
@@ -81,16 +82,18 @@ def list_folder(root: Path) -> Listing:
     skipped: list[Skipped] = []
     for folder in folders:
         if folder.name not in CATEGORIES:
-            skipped.append(Skipped(folder, "", folder.name, _unknown_category(folder.name)))
+            skipped.append(_skipped(folder, "", folder.name, _unknown_category(folder.name)))
             continue
         taken: set[str] = set()
         for entry, name, candidates in _entries(folder):
             try:
                 path = min(_models(entry, candidates), key=_preference)
+                if not str(path.relative_to(root)).isprintable():
+                    raise UserError("its name holds line breaks, or bytes that are no UTF-8: rename it")
                 if name in taken:
                     raise UserError(f"another mesh beside it is called {name} too: rename one of them")
             except UserError as error:
-                skipped.append(Skipped(entry, name, folder.name, str(error)))
+                skipped.append(_skipped(entry, name, folder.name, str(error)))
             else:
                 taken.add(name)
                 files.append(MeshFile(path, folder.name, name))
@@ -117,15 +120,15 @@ def list_table(root: Path, table: Path) -> Listing:
         file = MeshFile(path, row["category"], name, subset or "")
         if _hidden(PurePath(name)) or not name.isprintable() or "/" in name or "\\" in name:
             raise UserError(
-                f"{where}, row {number}: name '{name}' cannot be part of a file name; choose another"
+                f"{where}, row {number}: name {name!r} cannot be part of a file name; choose another"
             )
         if subset and subset not in SUBSETS:
             raise UserError(
-                f"{where}, row {number}: subset={subset} must be one of {', '.join(SUBSETS)}, or empty"
+                f"{where}, row {number}: subset={subset!r} must be one of {', '.join(SUBSETS)}, or empty"
             )
         if (former := files.get((file.category, name))) is not None:
             raise UserError(
-                f"{where}, row {number}: {file.category}/{name} is {former.path.name} already; "
+                f"{where}, row {number}: {printable(file.category)}/{name} is {former.path.name} already; "
                 f"give each its own in a column called name"
             )
         files[file.category, name] = file
@@ -133,7 +136,7 @@ def list_table(root: Path, table: Path) -> Listing:
     kept = []
     for file in sorted(files.values(), key=lambda file: (file.category, file.object_id)):
         if reason := _fault_of_row(file, divided):
-            skipped.append(Skipped(file.path, file.object_id, file.category, reason))
+            skipped.append(_skipped(file.path, file.object_id, file.category, reason))
         else:
             kept.append(file)
     return Listing(kept, skipped)
@@ -143,6 +146,10 @@ def _existing(root: Path) -> Path:
     if not root.is_dir():
         raise UserError(f"data.root={root}: no such folder; give one laid out as {LAYOUT}")
     return root
+
+
+def _skipped(path: Path, object_id: str, category: str, reason: str) -> Skipped:
+    return Skipped(Path(printable(str(path))), printable(object_id), printable(category), reason)
 
 
 def _hidden(path: PurePath) -> bool:
@@ -185,19 +192,20 @@ def _models(entry: Path, candidates: list[Path]) -> list[Path]:
 def _unknown_category(name: str) -> str:
     known = f"the categories are {', '.join(CATEGORIES)}"
     nearest = get_close_matches(name.lower(), CATEGORIES, n=1)
-    return f"'{name}' is not a category: {f'rename it to {nearest[0]}; ' if nearest else ''}{known}"
+    return f"{name!r} is not a category: {f'rename it to {nearest[0]}; ' if nearest else ''}{known}"
 
 
 def _rows(root: Path, table: Path) -> Iterator[tuple[int, dict[str, str]]]:
     """Rows with their numbers in the file, values without surrounding blanks."""
     try:
         with table.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file, restval="")
+            reader = csv.DictReader(file, restval="", strict=True)  # strict: of quotes
             names = [name.strip().lower() for name in reader.fieldnames or ()]
             missing = [name for name in ("file", "category") if name not in names]
             if missing:
+                found = printable(", ".join(names)) or "none"
                 raise UserError(
-                    f"data.table={table}: has no column {' and no '.join(missing)} but {', '.join(names) or 'none'}; "
+                    f"data.table={table}: has no column {' and no '.join(missing)} but {found}; "
                     f"its columns are {COLUMNS}, separated by commas"
                 )
             reader.fieldnames = names
@@ -213,7 +221,7 @@ def _inside(file: str, where: str) -> PurePath:
     """The relative path of a row, refused if it leads out of the folder."""
     path = PurePath(file)
     if not file or path.is_absolute() or ".." in path.parts or "\0" in file:
-        raise UserError(f"{where}: file='{file}' must be a path below data.root, without '..'")
+        raise UserError(f"{where}: file={file!r} must be a path below data.root, without '..'")
     return path
 
 

@@ -148,6 +148,9 @@ CHECKPOINTS = [
          ["output=tiny.ckpt/x"]),
     Case("metrics that are none", r"metrics=bad\.json: cannot be read; give the metrics\.json",
          ["metrics=bad.json"], content("bad.json", "[1")),
+    *[Case(f"{text} for metrics", r"metrics=bad\.json: cannot be read; give the metrics\.json",
+           ["metrics=bad.json"], content("bad.json", text))
+      for text in ("[1]", "3", '{"metrics": null}', '{"metrics": [1]}', '{"best": "x"}')],
 ]  # fmt: skip
 
 
@@ -290,8 +293,12 @@ FOLDERS = [
     Case("a table with a name that leads out", r"t\.csv, row 2: name '\.\./x' cannot be part of a file name",
          TABLE,
          mesh_folder(("t.csv", "file,category,name\na.obj,mug,../x\n"))),
-    Case("a table with an unknown subset", r"t\.csv, row 2: subset=dev must be one of train", TABLE,
+    Case("a table with an unknown subset", r"t\.csv, row 2: subset='dev' must be one of train", TABLE,
          mesh_folder(("t.csv", "file,category,subset\na.obj,mug,dev\n"))),
+    Case("a table with an open quote", r"t\.csv: cannot be read \(unexpected end of data\)", TABLE,
+         mesh_folder(("t.csv", 'file,category\n"a.obj,mug\nb.obj,mug\n'))),
+    Case("a table with a line break in a name", r"row 3: file='\.\./a\\nb\.obj' must be a path below data\.root", TABLE,
+         mesh_folder(("t.csv", 'file,category\n"../a\nb.obj",mug\n'))),
     Case("no time for a mesh", r"data\.time_limit=0\.0: must be above 0 seconds",
          ["data.time_limit=0"], BROKEN),
     Case("no memory for a mesh", r"data\.memory_limit=0\.1: must be at least 1 GB",
@@ -306,6 +313,12 @@ FOLDERS = [
          ["data=procedural", "paths.outputs=meshes"], content("meshes", "x")),
 ]  # fmt: skip
 
+#: As ``inspect data.root=meshes`` takes them.
+INSPECTIONS = [
+    Case("a category without meshes", r"data\.root=meshes: holds no mesh of mug, bowl, bottle; lay it out as",
+         prepare=lambda folder: (folder / "meshes" / "mug").mkdir(parents=True)),
+]  # fmt: skip
+
 #: As ``render`` takes them.
 SETTINGS = [
     Case("a word for a number", r"data\.views=many: must be a whole number", ["data.views=many"]),
@@ -316,8 +329,8 @@ SETTINGS = [
     Case("no views", r"data\.views=0: must be at least 1", ["data.views=0"]),
     Case("vast images", r"data\.image_side=100000: must be at most 4096", ["data.image_side=100000"]),
     Case("negative workers", r"workers=-1: must be at least 0", ["workers=-1"]),
-    Case("an infinite distance", r"rig\.distance=inf: must be above 0 and below inf", ["rig.distance=inf"]),
-    Case("NaN for an angle", r"rig\.half_angle_deg=nan: must be above 0 and below 90",
+    Case("an infinite distance", r"rig\.distance=inf: must be 0\.1 to 100", ["rig.distance=inf"]),
+    Case("NaN for an angle", r"rig\.half_angle_deg=nan: must be 0\.01 to 89",
          ["rig.half_angle_deg=nan"]),
     Case("NaN for a size", r"placement\.diagonal=\[nan, 1\.0\]: must be \[low, high\]",
          ["placement.diagonal=[nan,1]"]),

@@ -111,6 +111,7 @@ def noise(*shape: int) -> Any:
     return np.random.default_rng(0).integers(256, size=shape, dtype=np.uint8)
 
 
+UNREADABLE = np.tile(np.float32([[np.nan, np.inf, -np.inf, 0.5]]), (HEIGHT, WIDTH // 4))
 PLAIN = np.full((HEIGHT, WIDTH, 3), 255, np.uint8)
 TRANSPARENT = np.zeros((HEIGHT, WIDTH, 4), np.uint8)
 BOXES = ["left_box=[410,200,620,380]", "right_box=[300,200,505,380]"]
@@ -126,6 +127,7 @@ IMAGES = [
     Case("a folder for an image", r"left=left\.png: no such file", prepare=folder_called("left.png")),
     Case("text for an image", r"left=left\.png: is no image; give PNG", prepare=content("left.png", "text")),
     Case("an empty image file", r"right=right\.png: is no image; give PNG", prepare=content("right.png", "")),
+    Case("an image of nothing finite", r"left: ", prepare=image("left.tif", UNREADABLE), arguments=["left=left.tif"]),
     Case("half an image", r"left=left\.png: cannot be read \(", prepare=shortened("left.png")),
     Case("a vast image", r"left=left\.png: has more than 150 million pixels; scale it down",
          prepare=content("left.png", vast_png())),
@@ -218,6 +220,17 @@ CALIBRATIONS = [
          prepare=calibration(K1=np.zeros((3, 3)).tolist())),
     Case("a negative focal length", r"rig: K of the right camera must be",
          prepare=calibration(K2=[[-700, 0, 480], [0, 700, 270], [0, 0, 1]])),
+    Case("a focal length of a pixel", r"rig: the left camera has a focal length of 1 pixels.*check K",
+         prepare=calibration(K1=[[1, 0, 480], [0, 1, 270], [0, 0, 1]])),
+    Case("a vast focal length", r"rig: the right camera has a focal length of 1e\+08 pixels.*check K",
+         prepare=calibration(K2=[[1e8, 0, 480], [0, 1e8, 270], [0, 0, 1]])),
+    Case("numbers beyond counting in K", r"rig=rig\.yaml: K2 holds numbers above 1e\+09, got \[\[1e\+308",
+         prepare=calibration(K2=[[1e308, 0, 480], [0, 1e308, 270], [0, 0, 1]])),
+    Case("numbers beyond counting in T", r"rig=rig\.yaml: T holds numbers above 1e\+09",
+         prepare=calibration(T=[-1e308, 0, 0])),
+    Case("a vast unit", r"unit=1e\+300: must be one of m, cm, mm, in", ["unit=1e+300"]),
+    Case("a word for fisheye", r"rig=rig\.yaml: fisheye must be true or false, got 'yes'",
+         prepare=calibration(fisheye="yes")),
     Case("NaN in K", r"rig: K of the left camera must be",
          prepare=calibration(K1=[[np.nan, 0, 480], [0, 700, 270], [0, 0, 1]])),
     Case("K transposed", r"rig: K of the left camera must be .*transposed",
@@ -277,11 +290,17 @@ SETTINGS = [
     Case("a resolution beyond memory", r"resolution=100000: must be 8 to 512 cells", ["resolution=100000"]),
     Case("an infinite simplification", r"simplify=inf: must be metres above 0", ["simplify=inf"]),
     Case("a centre behind the cameras", r"must be in front of the cameras", ["center=[0,0,-1]", "size=0.1"]),
+    Case("a centre beside the images", r"center=\[1000000\.0, 0\.0, 1\.0\]: is at pixel \(\d+, \d+\) of an image of",
+         ["center=[1e6,0,1]", "size=0.1"]),
+    Case("a centre too far away", r"center=\[.*1e\+06 m away; it must be in both images and at most 100 m away",
+         ["center=[0,0,1e6]", "size=0.1"]),
     Case("a centre of two numbers", r"center=\[0\.0, 0\.0\]: must be \[x,y,z\]", ["center=[0,0]", "size=0.1"]),
     Case("NaN for the centre", r"center=\[nan, 0\.0, 1\.0\]: must be \[x,y,z\]",
          ["center=[nan,0,1]", "size=0.1"]),
     Case("a size of NaN", r"size=nan: must be metres above 0", ["size=nan"]),
     Case("a negative size", r"size=-0\.1: must be metres above 0", ["size=-0.1"]),
     Case("an unknown frame", r"frame=world: must be one of left, rig", ["frame=world"]),
+    Case("threads beyond counting", r"threads=100000: must be at most \d+, 16 for each core; this machine has \d",
+         ["threads=100000"]),
     Case("threads below one", r"threads=0: must be at least 1", ["threads=0"]),
 ]  # fmt: skip

@@ -18,6 +18,7 @@ from entry_points import EntryPoints, Outcome
 from omegaconf import OmegaConf
 from permissions import modes_obeyed
 from samples import TINY, pools_of, solid, views_of
+from trimesh.creation import box
 
 import stereo_occ
 from stereo_occ import reconstructor
@@ -151,11 +152,40 @@ def test_render(case, command):
     refused(case, command("render", arguments))
 
 
+@pytest.mark.parametrize("case", bad_files.INSPECTIONS, ids=name_of)
+def test_inspect(case, command):
+    case.prepare(command.folder)
+    refused(case, command("inspect", ["data.root=meshes", "progress=false", "workers=1", *case.arguments]))
+
+
 @pytest.mark.parametrize("case", bad_files.TRAININGS, ids=name_of)
 def test_train(case, command, checkpoint):
     shutil.copy(checkpoint, command.folder / "tiny.ckpt")
     case.prepare(command.folder)
     refused(case, command("train", replaced([*TINY, *RECTIFIED], case.arguments)))
+
+
+def test_meshes_for_training_alone_leave_no_run_folder(command):
+    """What is read of the meshes is kept: another table of them goes on from there."""
+    bad_files.mesh_folder(("t.csv", "file,category,subset\nmug.off,mug,train\n"))(command.folder)
+    box(extents=(0.1, 0.1, 0.1)).export(command.folder / "meshes" / "mug.off")
+    given = [
+        "data=meshes",
+        "data.root=meshes",
+        "data.table=meshes/t.csv",
+        "categories=mug",
+        "paths.data=cache",
+    ]
+    tiny = [override for override in TINY if not override.startswith("scale.counts")]
+    outcome = command("train", [*tiny, *RECTIFIED, *given, "hydra.run.dir=run"])
+    assert (outcome.code, outcome.lines) == (
+        2,
+        [
+            "stereo_occ: data.name=meshes: no object is in val; change data.fractions, or the lists that the data set "
+            "comes with"
+        ],
+    )
+    assert [name for name in outcome.touched if not name.startswith("cache")] == []
 
 
 @pytest.mark.parametrize("case", bad_files.COMPARISONS, ids=name_of)

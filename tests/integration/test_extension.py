@@ -81,6 +81,30 @@ def test_a_module_that_is_not_there_is_one_line(monkeypatch):
         extension.load_extensions()
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "line", "reason"),
+    [
+        ("parts_misspelt", "x = 1\ndef f(:\n", 2, "SyntaxError: "),
+        (
+            "parts_that_raise",
+            'x = 1\n\nraise RuntimeError("first\\nsecond")\n',
+            3,
+            "RuntimeError: first second; ",
+        ),
+        ("parts_that_need_more", "import no_such_library\n", 1, "ModuleNotFoundError: No module named"),
+    ],
+)
+def test_a_module_that_fails_is_one_line_with_its_place(tmp_path, monkeypatch, name, text, line, reason):
+    (tmp_path / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("STEREO_OCC_PLUGINS", name)
+    with pytest.raises(UserError) as refused:
+        extension.load_extensions()
+    message = str(refused.value)
+    assert message.startswith(f"STEREO_OCC_PLUGINS={name}: {tmp_path / name}.py, line {line}: {reason}")
+    assert len(message.splitlines()) == 1
+
+
 def test_a_name_belongs_to_one_part():
     with pytest.raises(
         UserError, match=r"model/encoder=light: is stereo_occ.models.light.LightEncoder already"

@@ -1,5 +1,7 @@
 """What a well-typed configuration can still get wrong: each problem names the key, its value and a way out."""
 
+import os
+
 import pytest
 import torch
 import yaml
@@ -14,6 +16,11 @@ from stereo_occ.problems import find_problems
 @pytest.fixture(scope="module")
 def valid():
     return compose_config("train")
+
+
+@pytest.fixture
+def four_cores(monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
 
 
 @pytest.mark.parametrize(
@@ -32,6 +39,10 @@ def valid():
         ("scheduler.name=cosin", "scheduler.name=cosin: unknown; did you mean cosine?"),
         ("scheduler.final=2", "scheduler.final=2.0: must be a share"),
         ("categories.names=[mgu]", "categories.names=mgu: unknown; did you mean mug?"),
+        (
+            "categories.names=[mug,mug]",
+            "categories.names=['mug', 'mug']: names a category twice; name each once",
+        ),
         ("categories.names=[]", "categories.names=[]: names no category"),
         ("+data.counts.cup=3", "data.counts.cup: unknown category; known: bottle, bowl, mug"),
         ("data.counts.mug=0", "data.counts.mug=0: must be at least 1; or leave mug out"),
@@ -56,9 +67,13 @@ def valid():
         ("placement.diagonal=[0.5]", "placement.diagonal=[0.5]: must be [low, high]"),
         ("placement.diagonal=[0.9,0.5]", "placement.diagonal=[0.9, 0.5]: must be [low, high]"),
         ("placement.diagonal=[0.5,2]", "placement.diagonal=[0.5, 2.0]: must be [low, high]"),
-        ("rig.fov_deg=180", "rig.fov_deg=180.0: must be above 0 and below 180"),
-        ("rig.half_angle_deg=-3", "rig.half_angle_deg=-3.0: must be above 0 and below 90"),
-        ("rig.distance=0", "rig.distance=0.0: must be above 0"),
+        ("rig.fov_deg=180", "rig.fov_deg=180.0: must be 1 to 170"),
+        ("rig.half_angle_deg=-3", "rig.half_angle_deg=-3.0: must be 0.01 to 89"),
+        ("rig.distance=0", "rig.distance=0.0: must be 0.1 to 100"),
+        ("rig.distance=1.0e+300", "rig.distance=1e+300: must be 0.1 to 100"),
+        ("rig.fov_deg=179.9", "rig.fov_deg=179.9: must be 1 to 170"),
+        ("data.pool_size=99999999", "data.pool_size=99999999: must be at most 10000000"),
+        ("logger.mesh_resolution=100000", "logger.mesh_resolution=100000: must be at most 512"),
         ("lights.count=[2,9]", "lights.count: must be [low, high]"),
         ("material.hue=[0,2]", "material.hue: must be [low, high]"),
         ("background.masked=2", "background.masked=2.0: is a share of the view pairs"),
@@ -70,6 +85,17 @@ def valid():
         ("trainer.devices=3", "batch_size=16: must be a multiple of the 3 processes"),
         ("trainer.nodes=2", "trainer.nodes=2: processes on several machines"),
         ("trainer.threads=0", "trainer.threads=0: must be at least 1"),
+        (
+            "trainer.threads=100000",
+            "trainer.threads=100000: must be at most 64, 16 for each core; this machine has 4",
+        ),
+        ("trainer.workers=100000", "trainer.workers=100000: must be at most 64"),
+        ("workers=100000", "workers=100000: must be at most 64"),
+        ("trainer.devices=65 batch_size=65", "trainer.devices=65: must be at most 64"),
+        (
+            "trainer.precision=16-mixed",
+            "trainer.precision=16-mixed: processors have no half precision; say bf16-mixed",
+        ),
         ("trainer.gradient_clip=-1", "trainer.gradient_clip=-1.0: must be above 0"),
         ("logger.mesh_resolution=0", "logger.mesh_resolution=0: must be at least 1"),
         ("model.encoder.name=foo", "model.encoder: unknown 'foo'"),
@@ -87,7 +113,7 @@ def valid():
         ("control.degrees=2", "control.degrees=2.0: control=none turns no camera; leave it at 0"),
     ],
 )
-def test_a_problem_of_a_training(valid, overrides, expected):
+def test_a_problem_of_a_training(valid, four_cores, overrides, expected):
     cfg = valid.copy()
     for override in overrides.split():
         key, _, value = override.partition("=")
@@ -182,14 +208,20 @@ def test_rendering_needs_no_division_into_subsets():
         ("views=0", "views=0: must be at least 1"),
         ("points=0", "points=0: must be at least 1"),
         ("mesh_resolution=0", "mesh_resolution=0: must be at least 1"),
+        ("mesh_resolution=100000", "mesh_resolution=100000: must be at most 512"),
+        ("surface_points=1000000000", "surface_points=1000000000: must be at most 10000000"),
+        ("points=1000000000", "points=1000000000: must be at most 10000000"),
         ("examples=-1", "examples=-1: must be at least 0"),
         ("meshes=-1", "meshes=-1: must be at least 0"),
+        ("workers=100000", "workers=100000: must be at most 64"),
+        ("trainer.threads=100000", "trainer.threads=100000: must be at most 64"),
+        ("trainer.precision=16-mixed", "trainer.precision=16-mixed: processors have no half precision"),
         ("training=['scale=smoke']", "training=['scale=smoke']: the checkpoint says what it was trained on"),
         ("control=calibration_off_1 control.degrees=-1", "control.degrees=-1.0: must be above 0"),
         ("checkpoint=nowhere.ckpt", "checkpoint=nowhere.ckpt: no such file; give the path of a .ckpt"),
     ],
 )
-def test_a_problem_of_an_evaluation(tmp_path, override, expected):
+def test_a_problem_of_an_evaluation(tmp_path, four_cores, override, expected):
     (tmp_path / "best.ckpt").touch()
     overrides = [f"checkpoint={tmp_path / 'best.ckpt'}", *override.split()]
     (problem,) = find_problems("evaluate", overrides, check_evaluation)

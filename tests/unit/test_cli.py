@@ -23,6 +23,7 @@ MISTAKES = [
     ("steps=4e3", "steps=4e3: must be a whole number"),
     ("steps=1.5", "steps=1.5: must be a whole number"),
     ("steps=null", "steps=null: must be a whole number"),
+    ("steps=1e20", "steps=1e20: must be a whole number"),
     ("optimizer.lr=fast", "optimizer.lr=fast: must be a number"),
     ("progress=maybe", "progress=maybe: must be true or false"),
     ("resume=perhaps", "resume=perhaps: must be one of never, auto"),
@@ -75,6 +76,38 @@ def test_values_that_are_missing():
     ]
 
 
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        (
+            "seed=${oc.env:NO_SUCH}",
+            "cannot be resolved (Environment variable 'NO_SUCH' not found); give a value",
+        ),
+        ("steps=${divide:1,0}", "cannot be resolved (integer division or modulo by zero); give a value"),
+        ("seed=${nosuch:1}", "cannot be resolved (Unsupported interpolation type nosuch); give a value"),
+        ("paths.data=${nowhere}", "refers to a key that does not exist"),
+        ("hydra.run.dir=${nowhere}", "refers to a key that does not exist"),
+        ("seed=4294967296", "must be at most 4294967295"),
+        ("steps=100000000000000000000", "must be at most 4294967295"),
+        ("scale.counts.mug=100000000000000000000", "must be at most 4294967295"),
+    ],
+)
+def test_a_value_that_is_well_typed_and_yet_none(override, expected):
+    assert found(override) == [f"{override}: {expected}"]
+
+
+def test_a_number_too_long_to_read():
+    override = f"steps={'9' * 5000}"
+    (problem,) = found(override)
+    assert problem.startswith(f"{override}: cannot be read")
+
+
+def test_groups_that_are_not_chosen_have_nothing_to_change():
+    for override, group in (("control.degrees=3", "control"), ("rig.fov_deg=50", "rig")):
+        (problem,) = found("checkpoint=x", override, program="evaluate")
+        assert problem.startswith(f"{override}: there is no {group} to change; say {group}=..., one of ")
+
+
 def test_parts_that_a_model_does_not_have():
     assert found("model=mono", "model/cost_volume=groupwise") == [
         "model/cost_volume=groupwise: model=mono has no cost_volume; leave it out or choose another model"
@@ -89,6 +122,7 @@ def test_parts_that_a_model_does_not_have():
     [
         [],
         ["debug=quick", "logger.tensorboard=off", "steps=${scale.views}", "hydra.run.dir=/tmp/a b"],
+        ["seed=4294967295", "hydra.run.dir=runs/${hydra:job.name}_${oc.env:HOME}"],
         ["~debug", "experiment=overfit", "++steps=100", "trainer.threads=null", "logger.tensorboard=no"],
         ["model=mono", "model.encoder.weights=null", "paths.data='/data/it is=here, (1)'"],
     ],
@@ -150,6 +184,23 @@ def test_composing_in_code_reports_the_same_problems():
         ),
         (train.main, ["seed=0,1"], ["seed=0,1: gives several values; add -m to run them one after another"]),
         (train.main, ["-m", "seed=0,-1"], ["seed=-1: must be at least 0"]),
+        (
+            train.main,
+            ["--cfg", "job", "rig=papper", "steps=x"],
+            ["rig=papper: unknown choice; did you mean paper?", "steps=x: must be a whole number"],
+        ),
+        (train.main, ["--help", "stesp=1"], ["stesp: unknown key; did you mean steps?"]),
+        (train.main, ["--info", "all", "steps=${no}"], ["steps=${no}: refers to a key that does not exist"]),
+        (
+            train.main,
+            ["--config-name", "nope"],
+            ["--config-name nope: each program has its own settings; add yours with --config-dir"],
+        ),
+        (
+            train.main,
+            ["--cfg", "job", "--config-dir", "nope"],
+            ["--config-dir nope: no such folder; give one such as DIR of DIR/experiment/mine.yaml"],
+        ),
         (evaluate.main, [], ["checkpoint: no value given; add checkpoint=... or baseline=..."]),
         (
             evaluate.main,
@@ -216,6 +267,27 @@ def test_a_failure_in_another_process_of_a_sweep_ends_it_with_its_line(tmp_path)
     assert run.stderr.splitlines()[-1] == "stereo_occ: seed=1: an unlucky number; choose another"
     assert "Traceback" not in run.stderr
     assert sorted(line for line in run.stdout.splitlines() if line.startswith("ran")) == ["ran 0", "ran 2"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a file of Linux that is always full")
+@pytest.mark.parametrize(
+    "program", [PROGRAM.replace("print(", "__import__('logging').getLogger('x').info('%s %s', "), PROGRAM]
+)
+def test_output_that_cannot_be_written_is_one_line(tmp_path, program):
+    (tmp_path / "program.py").write_text(program)
+    with Path("/dev/full").open("w") as full:
+        run = subprocess.run(
+            [sys.executable, "program.py"],
+            cwd=tmp_path,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+    assert run.returncode == 2
+    assert len(run.stderr.splitlines()) == 1, run.stderr
+    assert run.stderr.endswith("No space left on device; free some disk space\n")
 
 
 def test_a_launcher_that_is_not_installed_is_one_line(monkeypatch, capsys):

@@ -1,5 +1,7 @@
 """Which files of a folder become objects, and what is said of the others."""
 
+import os
+
 import pytest
 from mesh_files import box, put
 
@@ -134,7 +136,7 @@ def test_a_table_cannot_lead_out_of_the_folder(tmp_path, file):
         ("file,category\na.stl,mug\nb/a.stl,mug\n", "row 3: mug/a is a.stl already"),
         (
             "file,category,subset\na.stl,mug,training\n",
-            "row 2: subset=training must be one of train, val, test",
+            "row 2: subset='training' must be one of train, val, test",
         ),
         ("file,category,name\na.stl,mug,../b\n", r"row 2: name '\.\./b' cannot be part of a file name"),
         ("file,category,name\na.stl,mug,.b\n", r"row 2: name '\.b' cannot be"),
@@ -152,3 +154,14 @@ def test_a_table_that_cannot_be_read(tmp_path):
     (tmp_path / "noise.csv").write_bytes(bytes(range(256)))
     with pytest.raises(UserError, match=r"data.table=.*noise.csv: "):
         list_table(tmp_path, tmp_path / "noise.csv")
+
+
+@pytest.mark.parametrize(("name", "shown"), [(b"a\xff.obj", r"a\udcff.obj"), (b"a\nb.obj", r"a\nb.obj")])
+def test_a_name_that_cannot_be_written_down_is_left_out(tmp_path, name, shown):
+    (tmp_path / "mug").mkdir()
+    (tmp_path / "mug" / os.fsdecode(name)).touch()
+    (tmp_path / os.fsdecode(name)).mkdir()
+    listing = list_folder(tmp_path)
+    assert listing.files == []
+    assert sorted(file.path.name for file in listing.skipped) == [shown] * 2
+    assert all(str(file.path).isprintable() and file.reason.isprintable() for file in listing.skipped)

@@ -180,3 +180,29 @@ def test_a_job_that_a_machine_ended_is_run_again(whole, tmp_path):
 def test_a_number_out_of_range_is_one_line(tmp_path):
     with pytest.raises(UserError, match=r"hydra.sweeper.n_jobs=0: must be at least 1"):
         run(tmp_path, Launcher(), n_jobs=0)
+
+
+@pytest.mark.parametrize(
+    ("storage", "reason"),
+    [
+        ("nonsense", "Could not parse SQLAlchemy URL"),
+        ("foo://bar", "Can't load plugin"),
+        ("oracle://user@nowhere/db", "Failed to import DB access module"),
+        ("sqlite:///{folder}", "unable to open database file"),
+        ("sqlite:///{folder}/notes.txt", "file is not a database"),
+        ("sqlite:///{folder}/notes.txt/trials.db", "File exists|Not a directory"),
+    ],
+)
+def test_a_data_base_that_cannot_be_opened_is_one_line(tmp_path, storage, reason):
+    (tmp_path / "notes.txt").write_text("no data base")
+    address = storage.format(folder=tmp_path)
+    with pytest.raises(
+        UserError, match=rf"^hydra\.sweeper\.storage={address}: .*({reason}).*; say "
+    ) as refused:
+        run(tmp_path, Launcher(), storage=address)
+    assert len(str(refused.value).splitlines()) == 1
+    assert (tmp_path / "notes.txt").read_text() == "no data base"
+
+
+def test_a_large_seed_is_one(tmp_path):
+    assert len(run(tmp_path, Launcher(), n_trials=1, seed=2**32 - 1)) == 1
