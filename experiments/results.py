@@ -38,7 +38,12 @@ PROJECT = HERE.parent
 PAGES: dict[str, dict[str, Callable[[], str]]] = {
     "README.md": {"trained": run_tables.trained},
     "docs/metrics.md": {"decision": study_tables.decision, "floors": study_tables.floors},
-    "docs/models.md": {"cost": study_tables.cost, "models": study_tables.models, "speed": study_tables.speed},
+    "docs/models.md": {
+        "cost": study_tables.cost,
+        "models": study_tables.models,
+        "speed": study_tables.speed,
+        "volumes": partial(study_tables.changed, HERE / "cost_volumes"),
+    },
     "experiments/recipe_10k/README.md": {
         "over_mono": partial(run_tables.over_mono, RECIPE, "test", ("iou", "iou_unrotated", "handle_recall")),
         "parts": run_tables.parts,
