@@ -64,7 +64,7 @@ def test_checkpoints_and_weights_of_version_1_say_what_they_said(checkpoint, tmp
 def test_a_run_of_version_1_goes_on(checkpoint):
     saved = read_checkpoint(checkpoint)
     config = plain(training_config(saved[KEY]["config"]))
-    assert step_to_resume(checkpoint, config) == 12
+    assert step_to_resume(checkpoint, config, {"train": ["a"], "val": ["b"]}) == 12
     assert saved["optimizer_states"][0]["state"]
     assert saved[KEY]["training_weights"].keys() == {
         name.removeprefix("model.") for name in saved["state_dict"] if name.startswith("model.")

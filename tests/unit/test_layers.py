@@ -10,7 +10,7 @@ from stereo_occ.paths import PACKAGE
 KNOWN: dict[str, set[str]] = {
     "geometry": set(),
     "models": {"geometry"},
-    "shapes": {"occupancy", "writing"},
+    "shapes": {"occupancy", "printable", "writing"},
     "occupancy": {"geometry", "shapes"},
 }
 
