@@ -163,7 +163,7 @@ def test_other_objects_scenes_and_cameras(workshop, run, tmp_path):
     [
         (["views=3"], "views=3: there are only 2 of each object in test; ask for fewer"),
         (["points=5000"], "5000 asked from a pool of 2000"),
-        (["rig=paper", "rig.fov_deg=190"], "rig.fov_deg=190.0: must be above 0 and below 180"),
+        (["rig=paper", "rig.fov_deg=190"], "rig.fov_deg=190.0: must be 1 to 170"),
         (["data=meshes", "data.root=/nowhere"], "data.root=/nowhere: no such folder"),
         (["categories=mug", "categories.names=[cup]"], "categories.names=cup: unknown"),
     ],
