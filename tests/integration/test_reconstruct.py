@@ -170,7 +170,8 @@ def test_exported_weights_answer_as_their_checkpoint(checkpoint, tmp_path):
         np.testing.assert_array_equal(reconstruct(name, tmp_path / "b.ply").mesh.vertices, original.vertices)
     assert load_trained(str(tmp_path / "tiny.v1")).decision.threshold == pytest.approx(0.4)
     card = (tmp_path / "tiny.v1.md").read_text()
-    assert "7 steps on mug, bowl, bottle" in card
+    steps = load_trained(str(tmp_path / "tiny.v1")).config.steps
+    assert f"7 of {steps} steps on mug, bowl, bottle" in card
     assert "Not evaluated." in card
 
 
