@@ -48,12 +48,9 @@ def compare(
         metrics: those wanted; None is all that both sides have.
 
     Raises:
-        UserError: they were not measured on the same objects and views in the same way, lack a metric, or one side is
-            of several models.
+        UserError: they were not measured on the same objects and views in the same way, or lack a metric.
     """
     check_alike(a, b)
-    for side in (a, b):
-        check_seeds(side)
     shared = [name for name in METRICS if name in a.values and name in b.values]
     for name in metrics or ():
         if name not in shared:
@@ -182,6 +179,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         _check(asked)
         a, b = (read_evaluations(name, find_evaluations(name)) for name in (asked.a, asked.b))
+        for side in (a, b):
+            check_seeds(side)
         results = compare(a, b, asked.metrics, asked.draws, asked.seed)
         forest_plot(
             results, a.name, b.name, asked.output / PLOT
