@@ -41,6 +41,11 @@ class Evaluations:
     values: dict[str, NDArray[np.float64]]
     facts: list[dict[str, Any]]
 
+    @property
+    def categories(self) -> set[str]:
+        """Of the objects."""
+        return {category for category, _, _ in self.keys}
+
 
 def find_evaluations(pattern: str) -> list[Path]:
     """The folder of that name, or those that match the pattern.

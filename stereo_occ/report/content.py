@@ -117,8 +117,7 @@ def _counts(models: figures.Colored, notes: list[str]) -> dict[str, dict[str, ND
     counts: dict[str, dict[str, NDArray[np.int64]]] = {}
     for model, _ in models:
         for folder in model.folders:
-            categories = {key[0] for key in model.evaluations.keys}
-            for category, counts_2K in _curves(folder / "curves.json", categories).items():
+            for category, counts_2K in _curves(folder / "curves.json", model.evaluations.categories).items():
                 of_model = counts.setdefault(model.label, {})
                 of_model[category] = of_model.get(category, 0) + counts_2K
     without = [model.label for model, _ in models if model.label not in counts]

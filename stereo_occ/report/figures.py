@@ -139,7 +139,7 @@ def reliability(models: Colored) -> Figure:
 @mpl.rc_context(_STYLE)
 def scatter(focus: Model, against: Model, metric: str = "iou") -> Figure:
     """One dot per object: its mean over views and seeds by one model and by the other."""
-    categories = in_order(key[0] for key in focus.evaluations.keys)
+    categories = in_order(focus.evaluations.categories)
     figure, axes = _panels(len(categories))
     names = [key[:2] for key in focus.evaluations.keys]
     of_both = [

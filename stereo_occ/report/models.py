@@ -86,8 +86,7 @@ def read_models(folders: Sequence[Path]) -> list[Model]:
         check_alike(models[0].evaluations, model.evaluations)
         for facts, folder in zip(model.evaluations.facts, model.folders, strict=True):
             _check_same_test_set(models[0], facts, folder)
-            categories = {key[0] for key in model.evaluations.keys}
-            check_shown(facts, categories, folder / "metrics.json")
+            check_shown(facts, model.evaluations.categories, folder / "metrics.json")
     return models
 
 
