@@ -40,13 +40,11 @@ from stereo_occ.config import EvaluateConfig
 from stereo_occ.errors import UserError
 from stereo_occ.evaluation_data import (
     GROUPS,
+    OwnObjects,
     check_unseen,
     evaluated_pairs,
     has_other_meshes,
     own_settings,
-    seen_objects,
-    split_facts,
-    training_pairs,
 )
 from stereo_occ.evaluation_files import write_csv, write_examples
 from stereo_occ.kept_views import ViewKeeper
@@ -90,16 +88,16 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     asked = settings.subset
     if asked == "auto":
         settings.subset = "all" if has_other_meshes(cfg, trained) else "test"
-    data = evaluated_pairs(cfg, settings, trained)
+    own_objects = OwnObjects.of(cfg, settings, trained)
+    data = evaluated_pairs(cfg, settings, trained, own_objects)
     dataset = data.evaluation_dataset(settings.subset)
     assert data.prepared is not None
     noted = checkpoint[KEY].get("objects") if checkpoint else None
-    check_unseen(asked, data.prepared.sources, seen_objects(cfg, settings, trained, noted))
+    check_unseen(asked, data.prepared.sources, own_objects.seen(noted))
     facts: dict[str, Any] = {"step": None, "parameters": None, "trained": None}
     predictor: Predictor
     if settings.baseline is not None:
-        training = training_pairs(cfg, settings, trained)
-        predictor = build_baseline(settings.baseline, training, settings.progress)
+        predictor = build_baseline(settings.baseline, own_objects.training_pairs(settings), settings.progress)
     else:
         assert checkpoint is not None
         network = trained_model(checkpoint, str(settings.checkpoint))
@@ -144,7 +142,7 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
             "objects": len({(row["category"], row["object_id"]) for row in result.rows}),
             "views": settings.views,
             "points": settings.points,
-            "split": split_facts(cfg, settings, trained, data),
+            "split": own_objects.split_facts(data.prepared.sources),
             "decision": {"threshold": predictor.decision.threshold, "rule": predictor.decision.rule.value},
             "threshold": threshold,
             "control": plain(trained.control) if settings.baseline is None else None,

@@ -1,6 +1,7 @@
 """Which objects an evaluation measures, and which ones the measured model was trained on."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from omegaconf import DictConfig, OmegaConf
@@ -10,7 +11,7 @@ from stereo_occ.config import EvaluateConfig, TrainConfig
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.datamodule import PairsDataModule
 from stereo_occ.data.dataset import EvaluationPairs
-from stereo_occ.data.objects import ObjectSource, list_objects, members, training_objects
+from stereo_occ.data.objects import Objects, ObjectSource, list_objects, members
 from stereo_occ.errors import UserError
 from stereo_occ.provenance import split_hash
 
@@ -33,7 +34,78 @@ def has_other_meshes(cfg: DictConfig, trained: DictConfig) -> bool:
     return asked is not None and (own is None or Path(asked).resolve() != Path(own).resolve())
 
 
-def evaluated_pairs(cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig) -> PairsDataModule:
+@dataclass(frozen=True)
+class OwnObjects:
+    """The objects of a model's own training, as its settings give them now.
+
+    Attributes:
+        split: objects or views.
+        pairs, objects: its settings and their objects; None, with the ``problem``, where there are no longer any.
+        train, val: what the model learnt from, and what its checkpoint was chosen by.
+    """
+
+    split: SplitKind
+    pairs: TrainConfig | None = None
+    objects: Objects | None = None
+    train: list[ObjectSource] = field(default_factory=list)
+    val: list[ObjectSource] = field(default_factory=list)
+    problem: str = ""
+
+    @classmethod
+    def of(cls, cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig) -> "OwnObjects":
+        """Of a training configuration, with the paths of the evaluation ``cfg``."""
+        split = trained.data.split
+        try:
+            pairs = _typed(trained.copy(), cfg)
+            objects = list_objects(pairs, settings.progress)
+            train, val = (members(objects.sources, pairs, subset) for subset in ("train", "val"))
+        except UserError as error:
+            return cls(split, problem=str(error))
+        return cls(split, pairs, objects, train, val)
+
+    def seen(self, noted: Mapping[str, list[str]] | None) -> Mapping[str, list[str]]:
+        """Identities by subset: those ``noted`` in the checkpoint, or of old ones these; none if views are split."""
+        if self.split is SplitKind.view:
+            return {}
+        if noted is not None:
+            return noted
+        return {name: [source.identity for source in getattr(self, name)] for name in ("train", "val")}
+
+    def training_pairs(self, settings: EvaluateConfig) -> Callable[[str], EvaluationPairs]:
+        """A function that gives the pairs of ``train``, or of ``val`` as many of each object as are evaluated.
+
+        Raises:
+            UserError: the objects can no longer be listed.
+        """
+        if self.pairs is None:
+            raise UserError(self.problem)
+        typed = self.pairs
+
+        def pairs(subset: str) -> EvaluationPairs:
+            shards, views = _module(typed, settings, subset, self.objects).subset(subset)
+            count = settings.views if subset == "val" else len(views)
+            return EvaluationPairs(shards, views[:count], min(settings.points, typed.data.pool_size))
+
+        return pairs
+
+    def split_facts(self, evaluated: Sequence[ObjectSource]) -> dict[str, object]:
+        """``hash`` of the names of training and evaluated objects, and their numbers; see ``provenance``.
+
+        Where the training objects can no longer be listed, ``hash`` is None and ``reason`` says why.
+        """
+        if self.pairs is None:
+            return {"hash": None, "evaluated": len(evaluated), "reason": self.problem}
+        return {
+            "hash": split_hash(self.train, evaluated),
+            "training": len(self.train),
+            "evaluated": len(evaluated),
+            "kind": self.split.value,
+        }
+
+
+def evaluated_pairs(
+    cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig, own: OwnObjects
+) -> PairsDataModule:
     """The pairs of the training's own data, with the groups replaced that the command line gives.
 
     Raises:
@@ -48,40 +120,8 @@ def evaluated_pairs(cfg: DictConfig, settings: EvaluateConfig, trained: DictConf
             pairs.data.views = settings.views  # no more than are looked at
         if OmegaConf.is_interpolation(cfg.data, "image_side"):
             pairs.data.image_side = trained.data.image_side
-    return _module(_typed(pairs, cfg), settings, settings.subset)
-
-
-def training_pairs(
-    cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig
-) -> Callable[[str], EvaluationPairs]:
-    """A function that gives the pairs of ``train``, or of ``val`` as many of each object as are evaluated."""
-    typed = _typed(trained.copy(), cfg)
-
-    def pairs(subset: str) -> EvaluationPairs:
-        shards, views = _module(typed, settings, subset).subset(subset)
-        if not shards:
-            raise UserError(f"data.fractions={typed.data.fractions}: leaves no object for {subset}")
-        count = settings.views if subset == "val" else len(views)
-        return EvaluationPairs(shards, views[:count], min(settings.points, typed.data.pool_size))
-
-    return pairs
-
-
-def seen_objects(
-    cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig, noted: Mapping[str, list[str]] | None
-) -> Mapping[str, list[str]]:
-    """Identities of the objects of a training: those noted in its checkpoint, else those that its settings give now.
-
-    There are none where these can no longer be listed, or where the subsets share all objects.
-    """
-    if trained.data.split == SplitKind.view:
-        return {}
-    if noted is not None:
-        return noted
-    try:
-        return training_objects(_typed(trained.copy(), cfg), settings.progress)
-    except UserError:
-        return {}
+    same = cfg.data is None and cfg.categories is None
+    return _module(_typed(pairs, cfg), settings, settings.subset, own.objects if same else None)
 
 
 def check_unseen(asked: str, evaluated: Sequence[ObjectSource], seen: Mapping[str, list[str]]) -> None:
@@ -106,28 +146,6 @@ def check_unseen(asked: str, evaluated: Sequence[ObjectSource], seen: Mapping[st
         )
 
 
-def split_facts(
-    cfg: DictConfig, settings: EvaluateConfig, trained: DictConfig, data: PairsDataModule
-) -> dict[str, object]:
-    """``hash`` of the names of the training and the evaluated objects, and their numbers; see ``provenance``.
-
-    Where the training objects can no longer be listed, ``hash`` is None and ``reason`` says why.
-    """
-    assert data.prepared is not None
-    evaluated = data.prepared.sources
-    try:
-        typed = _typed(trained.copy(), cfg)
-        training = members(list_objects(typed, settings.progress).sources, typed, "train")
-    except UserError as error:
-        return {"hash": None, "evaluated": len(evaluated), "reason": str(error)}
-    return {
-        "hash": split_hash(training, evaluated),
-        "training": len(training),
-        "evaluated": len(evaluated),
-        "kind": typed.data.split.value,
-    }
-
-
 def _typed(pairs: DictConfig, cfg: DictConfig) -> TrainConfig:
     pairs.paths, pairs.workers = cfg.paths, cfg.workers
     problems = check_pairs(pairs)
@@ -138,7 +156,9 @@ def _typed(pairs: DictConfig, cfg: DictConfig) -> TrainConfig:
     return typed
 
 
-def _module(typed: TrainConfig, settings: EvaluateConfig, subset: str) -> PairsDataModule:
+def _module(
+    typed: TrainConfig, settings: EvaluateConfig, subset: str, objects: Objects | None
+) -> PairsDataModule:
     return PairsDataModule(
         typed,
         control=typed.control,
@@ -148,4 +168,5 @@ def _module(typed: TrainConfig, settings: EvaluateConfig, subset: str) -> PairsD
         workers=settings.trainer.workers,
         progress=settings.progress,
         only=subset,
+        objects=objects,
     )

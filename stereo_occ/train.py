@@ -16,10 +16,9 @@ from stereo_occ.checkpoint import build_task, plain
 from stereo_occ.checks import check_training
 from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
-from stereo_occ.data.datamodule import NO_OBJECTS, PairsDataModule
-from stereo_occ.data.objects import training_objects
+from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.data.objects import Objects, list_objects, training_objects
 from stereo_occ.divergence import StopIfDiverged
-from stereo_occ.errors import UserError
 from stereo_occ.group import is_first, run_in_processes, started_elsewhere
 from stereo_occ.loggers.board import Board
 from stereo_occ.loggers.build import build_boards
@@ -49,16 +48,14 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
         torch.set_num_threads(typed.trainer.threads)
     latest = folder / "last.ckpt"
     resume = typed.resume is Resume.auto and latest.exists()
-    objects = training_objects(typed, typed.progress and is_first())
-    for subset, names in objects.items():
-        if not names:
-            raise UserError(f"data.name={typed.data.name}: {NO_OBJECTS.format(subset)}")
-    step = step_to_resume(latest, plain(cfg), objects) if resume else 0
+    objects = list_objects(typed, typed.progress and is_first())
+    identities = training_objects(objects.sources, typed)
+    step = step_to_resume(latest, plain(cfg), identities) if resume else 0
     lightning.seed_everything(typed.seed, verbose=False)
-    task = build_task(cfg, load_weights=not resume and typed.init is None, objects=objects)
+    task = build_task(cfg, load_weights=not resume and typed.init is None, objects=identities)
     if typed.init is not None and not resume:
         begin_with(typed.init, task.model, plain(cfg)["model"])
-    data = build_data(typed)
+    data = build_data(typed, objects)
     boards: list[Board] = []
     if is_first():
         data.prepare_data()
@@ -81,8 +78,8 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
     return trainer
 
 
-def build_data(typed: TrainConfig) -> PairsDataModule:
-    """The data of a training configuration."""
+def build_data(typed: TrainConfig, objects: Objects | None = None) -> PairsDataModule:
+    """The data of a training configuration, whose objects may be listed already."""
     data = PairsDataModule(
         typed,
         control=typed.control,
@@ -91,6 +88,7 @@ def build_data(typed: TrainConfig) -> PairsDataModule:
         evaluation_batch_size=typed.batch_size,
         workers=typed.trainer.workers,
         progress=typed.progress,
+        objects=objects,
     )
     data.for_training(
         typed.queries,

@@ -11,14 +11,12 @@ from stereo_occ.data.batch import Batch
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.controls import ControlConfig
 from stereo_occ.data.dataset import DealtBatches, EvaluationPairs, ShuffledBatches, TrainingPairs, whole_batch
-from stereo_occ.data.objects import members
+from stereo_occ.data.objects import Objects, members
 from stereo_occ.data.prepare import PreparedShards, prepare
 from stereo_occ.data.shard import Shard
 from stereo_occ.data.splits import SUBSETS, split_views
 from stereo_occ.errors import UserError
 from stereo_occ.group import place
-
-NO_OBJECTS = "no object is in {}; change data.fractions, or the lists that the data set comes with"
 
 
 class PairsDataModule(lightning.LightningDataModule):
@@ -29,6 +27,7 @@ class PairsDataModule(lightning.LightningDataModule):
         evaluation_points: query points per pose and metric.
         only: the one subset that will be asked for, so that no other is rendered.
         control: that all batches are under.
+        objects: of ``pairs``, where they are listed already.
     """
 
     def __init__(
@@ -41,6 +40,7 @@ class PairsDataModule(lightning.LightningDataModule):
         progress: bool = True,
         only: str = "all",
         control: ControlConfig | None = None,
+        objects: Objects | None = None,
     ) -> None:
         super().__init__()
         self.pairs = pairs
@@ -51,6 +51,7 @@ class PairsDataModule(lightning.LightningDataModule):
         self.progress = progress
         self.only = only
         self.control = control or ControlConfig()
+        self.objects = objects
         self.prepared: PreparedShards | None = None
         self._training: dict[str, Any] = {}
 
@@ -81,7 +82,7 @@ class PairsDataModule(lightning.LightningDataModule):
 
     def prepare_data(self) -> None:
         """Render the missing shards."""
-        self.prepared = prepare(self.pairs, self.progress, self.only)
+        self.prepared = prepare(self.pairs, self.progress, self.only, objects=self.objects)
 
     def subset(self, name: str) -> tuple[list[Shard], list[int]]:
         """The shards of ``train``, ``val``, ``test`` or ``all``, and which views of each belong to it."""
@@ -104,8 +105,6 @@ class PairsDataModule(lightning.LightningDataModule):
         """Shuffled batches from the trainer's current step on."""
         settings = self._training
         shards, views = self.subset("train")
-        if not shards:
-            raise UserError(f"data.name={self.pairs.data.name}: {NO_OBJECTS.format('train')}")
         dataset = TrainingPairs(
             shards,
             views,
@@ -136,8 +135,6 @@ class PairsDataModule(lightning.LightningDataModule):
     def evaluation_dataset(self, subset: str) -> EvaluationPairs:
         """The first ``evaluation_views`` poses of each object of a subset, with fixed points."""
         shards, views = self.subset(subset)
-        if not shards:
-            raise UserError(f"data.name={self.pairs.data.name}: {NO_OBJECTS.format(subset)}")
         if len(views) < self.evaluation_views:
             raise UserError(
                 f"views={self.evaluation_views}: there are only {len(views)} of each object in {subset}; ask for fewer"

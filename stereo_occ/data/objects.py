@@ -118,7 +118,7 @@ def members(objects: Sequence[ObjectSource], pairs: PairsConfig, subset: str) ->
     """The objects that ``train``, ``val``, ``test`` or ``all`` needs.
 
     Raises:
-        UserError: there is none at all, or a category has fewer objects than subsets to fill.
+        UserError: there is none, or a category has fewer objects than subsets to fill.
     """
     if not objects:
         raise UserError(
@@ -130,18 +130,22 @@ def members(objects: Sequence[ObjectSource], pairs: PairsConfig, subset: str) ->
     by_key = {source.key: source for source in objects}
     given = {source.key: source.subset for source in objects if source.subset}
     division = split_objects(list(by_key), pairs.data.fractions, pairs.data.seed, given)
+    if not division[subset]:
+        raise UserError(
+            f"data.name={pairs.data.name}: no object is in {subset}; change data.fractions, or the lists that the "
+            f"data set comes with"
+        )
     return [by_key[key] for key in division[subset]]
 
 
-def training_objects(pairs: PairsConfig, progress: bool) -> dict[str, list[str]]:
+def training_objects(objects: Sequence[ObjectSource], pairs: PairsConfig) -> dict[str, list[str]]:
     """Identities of the objects that a training learns from (``train``) and chooses by (``val``).
 
     Raises:
-        UserError: as :func:`list_objects` and :func:`members`.
+        UserError: as :func:`members`.
     """
-    sources = list_objects(pairs, progress).sources
     return {
-        subset: sorted(source.identity for source in members(sources, pairs, subset))
+        subset: sorted(source.identity for source in members(objects, pairs, subset))
         for subset in ("train", "val")
     }
 

@@ -19,7 +19,7 @@ from tqdm import tqdm
 from stereo_occ.config import PairsConfig
 from stereo_occ.data.config import NOT_CONTENT, SliceConfig
 from stereo_occ.data.meshes import MeshRecord
-from stereo_occ.data.objects import ObjectSource, list_objects, members
+from stereo_occ.data.objects import Objects, ObjectSource, list_objects, members
 from stereo_occ.data.pairs import Stream, render_views
 from stereo_occ.data.processes import start_worker
 from stereo_occ.data.rigs import ToedInRigConfig
@@ -47,7 +47,11 @@ class PreparedShards:
 
 
 def prepare(
-    pairs: PairsConfig, progress: bool, subset: str = "all", part: SliceConfig | None = None
+    pairs: PairsConfig,
+    progress: bool,
+    subset: str = "all",
+    part: SliceConfig | None = None,
+    objects: Objects | None = None,
 ) -> PreparedShards:
     """Make sure that every shard of ``pairs`` exists; render the missing ones with a progress bar.
 
@@ -58,11 +62,12 @@ def prepare(
     Args:
         subset: ``train``, ``val`` or ``test`` for the shards of that subset alone.
         part: a slice of these shards, for several machines to share the work.
+        objects: of ``pairs``, where they are listed already.
 
     Raises:
         UserError: from the objects, the renderer or the disk.
     """
-    prepared = locate(pairs, progress, subset, part)
+    prepared = locate(pairs, progress, subset, part, objects)
     found = zip(prepared.sources, prepared.paths, strict=True)
     missing = [(source, path) for source, path in found if not path.exists()]
     if missing:
@@ -84,10 +89,14 @@ def prepare(
 
 
 def locate(
-    pairs: PairsConfig, progress: bool, subset: str = "all", part: SliceConfig | None = None
+    pairs: PairsConfig,
+    progress: bool,
+    subset: str = "all",
+    part: SliceConfig | None = None,
+    objects: Objects | None = None,
 ) -> PreparedShards:
     """Where the shards of ``pairs`` are, or will be when they are rendered; see :func:`prepare`."""
-    objects = list_objects(pairs, progress)
+    objects = objects or list_objects(pairs, progress)
     sources = members(objects.sources, pairs, subset)
     if part is not None:
         sources = sources[part.index - 1 :: part.of]
