@@ -16,6 +16,7 @@ from hydra._internal.utils import get_args_parser
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig
+from omegaconf.errors import InterpolationKeyError
 
 from stereo_occ.config import register_schemas
 from stereo_occ.errors import UserError
@@ -103,6 +104,10 @@ def entry_point(
                     raise SystemExit(2)
                 with _errors_raised(), watched_output(refuse):
                     run_hydra()
+            except InterpolationKeyError as error:
+                if not arguments.resolve:
+                    raise
+                refuse(f"--resolve: {error}, which a checkpoint gives; leave --resolve out")
             except Exception as error:
                 refuse(one_line(error))
             if failures:

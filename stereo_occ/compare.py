@@ -9,7 +9,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -19,8 +19,10 @@ from stereo_occ.evaluation_rows import Evaluations, find_evaluations, read_evalu
 from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 from stereo_occ.metrics.summary import METRICS
 from stereo_occ.model_settings import model_settings
+from stereo_occ.printable import printable
 from stereo_occ.provenance import environment
 from stereo_occ.system_errors import one_line
+from stereo_occ.watched_output import watched_output
 from stereo_occ.writing import write_json
 
 #: What both sides must have been measured with, as named in ``metrics.json``.
@@ -113,7 +115,7 @@ def check_alike(a: Evaluations, b: Evaluations) -> None:
 
 
 def check_seeds(side: Evaluations) -> None:
-    """Refuse results that are of several models, and no seeds of one."""
+    """Refuse results that are of several models, or twice of one training: they are no seeds of one model."""
     first = model_settings(side.facts[0])
     for folder, facts in zip(side.folders, side.facts, strict=True):
         settings = model_settings(facts)
@@ -122,6 +124,12 @@ def check_seeds(side: Evaluations) -> None:
             raise UserError(
                 f"{side.name}: {side.folders[0]} and {folder} are no seeds of one model, they differ in {other[0]} "
                 f"({first.get(other[0])} and {settings.get(other[0])}); compare them one by one"
+            )
+    of_seed: dict[int, Path] = {}
+    for folder, seed in zip(side.folders, side.seeds, strict=True):
+        if seed is not None and of_seed.setdefault(seed, folder) != folder:
+            raise UserError(
+                f"{side.name}: {of_seed[seed]} and {folder} are both of the training with seed {seed}; give one of them"
             )
 
 
@@ -186,12 +194,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
             results, a.name, b.name, asked.output / PLOT
         )  # the larger one first, while nothing is there
         write_json(asked.output / RECORD, _record(a, b, results, asked.draws, asked.seed))
+        with watched_output(_refuse):
+            for line in _report(a, b, results, asked.output).split("\n"):
+                sys.stdout.write(f"{printable(line)}\n")
     except Exception as error:
-        sys.stderr.write(f"stereo_occ: {one_line(error)}\n")
-        raise SystemExit(2) from None
+        _refuse(one_line(error))
+
+
+def _report(a: Evaluations, b: Evaluations, results: Results, output: Path) -> str:
     seeds = f"A: {a.name} ({len(a.folders)} seeds)\nB: {b.name} ({len(b.folders)} seeds)"
     notes = "".join(f"note: {note}\n" for note in _notes(a, b))
-    sys.stdout.write(f"{seeds}\n{notes}\n{table(results)}\n\nalso in {asked.output}\n")
+    return f"{seeds}\n{notes}\n{table(results)}\n\nalso in {output}"
+
+
+def _refuse(problem: str) -> NoReturn:
+    sys.stderr.write(f"stereo_occ: {printable(problem)}\n")
+    raise SystemExit(2)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from stereo_occ.metrics.statistics import Difference
 from stereo_occ.metrics.summary import METRICS
+from stereo_occ.printable import printable
 from stereo_occ.writing import whole_file
 
 _COLUMNS = 4
@@ -33,7 +34,7 @@ def forest_figure(results: Mapping[str, Mapping[str, Difference]], name_a: str, 
         _panel(axis, metric, differences)
     for axis in axes[len(results) :]:
         axis.set_axis_off()
-    title = f"A - B with 95 % intervals\nA: {name_a}   B: {name_b}"
+    title = f"A - B with 95 % intervals\nA: {printable(name_a)}   B: {printable(name_b)}"
     figure.suptitle(title, fontsize=9, parse_math=False)  # a folder's name may hold dollars
     return figure
 

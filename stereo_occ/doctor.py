@@ -31,21 +31,32 @@ STEPS = 40_000
 
 def main() -> None:
     """Print the report as Markdown."""
+    text, remedies = report()
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        # Else Python tries once more when it ends, and complains in lines of its own.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        sys.exit(f"stereo_occ: <stdout>: {error.strerror}; let the report go where it can be written")
+    sys.exit(1 if remedies else 0)
+
+
+def report() -> tuple[str, list[str]]:
+    """The report, and what is to be done."""
     remedies: list[str] = []
     rows, needed = machine(remedies), packages(remedies)
     rows += (
         [("the rest", "not tried; first see below")] if remedies else [*opengl(remedies), *speed(remedies)]
     )
-    print("### stereo_occ.doctor\n")
-    for name, value in rows:
-        print(f"- {name}: {value}")
-    print("\n| package | installed | needed |\n|---|---|---|")
-    for row in needed:
-        print(f"| {' | '.join(row)} |")
-    print("\nTo do:" if remedies else "\nAll that is needed is here.")
-    for remedy in remedies:
-        print(f"- {remedy}")
-    sys.exit(1 if remedies else 0)
+    lines = [
+        "### stereo_occ.doctor\n",
+        *(f"- {name}: {value}" for name, value in rows),
+        "\n| package | installed | needed |\n|---|---|---|",
+        *(f"| {' | '.join(row)} |" for row in needed),
+        "\nTo do:" if remedies else "\nAll that is needed is here.",
+        *(f"- {remedy}" for remedy in remedies),
+    ]
+    return "\n".join(lines), remedies
 
 
 def machine(remedies: list[str]) -> list[tuple[str, str]]:

@@ -46,6 +46,11 @@ class Evaluations:
         """Of the objects."""
         return {category for category, _, _ in self.keys}
 
+    @property
+    def seeds(self) -> list[int | None]:
+        """Of each training; None where the file does not say."""
+        return [(facts.get("trained") or {}).get("config", {}).get("seed") for facts in self.facts]
+
 
 def find_evaluations(pattern: str) -> list[Path]:
     """The folder of that name, or those that match the pattern.

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from stereo_occ.compare import check_alike
+from stereo_occ.compare import check_alike, check_seeds
 from stereo_occ.errors import UserError
 from stereo_occ.evaluation_rows import Evaluations, read_evaluations, read_facts
 from stereo_occ.model_settings import Settings, model_settings
@@ -55,20 +55,13 @@ class Model:
         """Mean of category means, over the seeds."""
         return float(np.mean([facts["metrics"][f"test/{metric}"] for facts in self.evaluations.facts]))
 
-    @property
-    def seeds(self) -> list[int | None]:
-        """Of each training; None where the file does not say."""
-        return [
-            (facts.get("trained") or {}).get("config", {}).get("seed") for facts in self.evaluations.facts
-        ]
-
 
 def read_models(folders: Sequence[Path]) -> list[Model]:
     """The models of these evaluations, in the order in which they first come.
 
     Raises:
-        UserError: a folder is none of an evaluation, its files are damaged, or they were not measured on the same test
-            set in the same way.
+        UserError: a folder is none of an evaluation, its files are damaged, two are of one training, or they were not
+            measured on the same test set in the same way.
     """
     groups: dict[str, list[Path]] = {}
     settings: dict[str, Settings] = {}
@@ -83,6 +76,7 @@ def read_models(folders: Sequence[Path]) -> list[Model]:
         for label, (name, in_group) in zip(labels, groups.items(), strict=True)
     ]
     for model in models:
+        check_seeds(model.evaluations)
         check_alike(models[0].evaluations, model.evaluations)
         for facts, folder in zip(model.evaluations.facts, model.folders, strict=True):
             _check_same_test_set(models[0], facts, folder)

@@ -62,5 +62,7 @@ def run_facts(content: Content) -> list[dict[str, Any]]:
             "failures": ", ".join(f"{count} {name}" for name, count in facts["failures"].items()) or "none",
         }
         for model, color in content.models
-        for folder, seed, facts in zip(model.folders, model.seeds, model.evaluations.facts, strict=True)
+        for folder, seed, facts in zip(
+            model.folders, model.evaluations.seeds, model.evaluations.facts, strict=True
+        )
     ]

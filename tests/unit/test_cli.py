@@ -201,6 +201,13 @@ def test_composing_in_code_reports_the_same_problems():
             ["--cfg", "job", "--config-dir", "nope"],
             ["--config-dir nope: no such folder; give one such as DIR of DIR/experiment/mine.yaml"],
         ),
+        (
+            evaluate.main,
+            ["--cfg", "job", "--resolve", "data=meshes"],
+            [
+                "--resolve: Interpolation key 'scale.views' not found, which a checkpoint gives; leave --resolve out"
+            ],
+        ),
         (evaluate.main, [], ["checkpoint: no value given; add checkpoint=... or baseline=..."]),
         (
             evaluate.main,
@@ -233,6 +240,22 @@ def main(cfg):
 
 main()
 """
+
+
+def test_what_is_logged_can_go_to_the_console_alone(tmp_path):
+    (tmp_path / "program.py").write_text(PROGRAM.replace("print(", "__import__('logging').warning('%s %s', "))
+    for logs, files in (("to_file", ["train.log"]), ("stdout", [])):
+        run = subprocess.run(
+            [sys.executable, "program.py", f"hydra/job_logging={logs}", f"hydra.run.dir={logs}"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        assert run.returncode == 0, run.stderr
+        assert "ran 0" in run.stdout
+        assert [path.name for path in (tmp_path / logs).iterdir()] == files
 
 
 def test_a_failure_in_a_sweep_is_one_line_and_the_other_jobs_run(tmp_path):

@@ -3,6 +3,7 @@
 import csv
 import errno
 import json
+import os
 
 import numpy as np
 import pytest
@@ -165,6 +166,35 @@ def test_the_folders_of_one_side_are_seeds_of_one_model(tmp_path, capsys, of_sec
             f"b_2 are no seeds of one model, they differ in {difference}; compare them one by one" in message
         )
         assert not (tmp_path / "out").exists()
+
+
+def test_two_evaluations_of_one_training_are_no_seeds(tmp_path, capsys):
+    trained = {"config": {"seed": 3, "model": {"name": "stereo"}}}
+    best, last = (evaluation(tmp_path / f"b_{name}", hard, trained=trained) for name in ("best", "last"))
+    message = refusal(
+        capsys, evaluation(tmp_path / "a", hard), tmp_path / "b_*", "--output", tmp_path / "out"
+    )
+    assert f"{best} and {last} are both of the training with seed 3; give one of them" in message
+    assert not (tmp_path / "out").exists()
+
+
+def test_names_that_are_no_utf8_are_written_as_escapes(tmp_path, capsys):
+    a = evaluation(tmp_path / os.fsdecode(b"a\xff"), hard)
+    printed, record = run(tmp_path, capsys, a, a)
+    assert r"a\udcff (1 seeds)" in printed
+    assert record["a"] == [str(a)]
+    assert (tmp_path / "out" / "comparison.png").is_file()
+
+
+def test_a_full_terminal_is_one_line(tmp_path, capsys, monkeypatch):
+    def write(text):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    a = evaluation(tmp_path / "a", hard)
+    monkeypatch.setattr("sys.stdout.write", write)
+    assert refusal(capsys, a, a, "--output", tmp_path / "out", "--draws", "300").endswith(
+        "No space left on device; free some disk space\n"
+    )
 
 
 def cut(path, size):

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError
+from pathlib import Path
 
 import pytest
 
@@ -24,6 +25,23 @@ def report(capsys, monkeypatch, **probes):
     with pytest.raises(SystemExit) as stop:
         doctor.main()
     return capsys.readouterr().out.splitlines(), stop.value.code
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a file of Linux that is always full")
+def test_a_report_that_cannot_be_written_is_one_line():
+    program = "from stereo_occ import doctor; doctor._probe = lambda what: {'error': 'broken'}; doctor.main()"
+    with Path("/dev/full").open("w") as full:
+        run = subprocess.run(
+            [sys.executable, "-c", program],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+    assert run.returncode == 1
+    expected = "stereo_occ: <stdout>: No space left on device; let the report go where it can be written"
+    assert run.stderr.splitlines() == [expected]
 
 
 def test_a_machine_that_is_well(capsys, monkeypatch):

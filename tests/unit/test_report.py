@@ -61,7 +61,7 @@ def test_seeds_of_one_model_are_found_whatever_their_folders_are_called(tmp_path
     models = read_models(folders)
     assert [model.label for model in models] == ["stereo", "mono", "stereo, control=right_shuffled"]
     assert [model.folders for model in models] == [[folders[0], folders[2]], [folders[1]], [folders[3]]]
-    assert [model.seeds for model in models] == [[0, 1], [0], [2]]
+    assert [model.evaluations.seeds for model in models] == [[0, 1], [0], [2]]
     assert [model.uses_pair for model in models] == [True, False, False]
 
 
