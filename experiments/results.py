@@ -109,7 +109,7 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
             run_tables.less,
             {
                 f"`{name}`, {where} objects": WHOLE / f"{name}_against_quarter{suffix}"
-                for name in (MONO, "stereo")
+                for name in (MONO, "stereo", "plane_sweep_guided")
                 for where, suffix in (("test", ""), ("real", "_real"))
             },
             ("iou",),
@@ -198,7 +198,7 @@ def main() -> None:
     figures.curves()
     for family in (RECIPE, WHOLE):
         figures.recipe_curves(family)
-    figures.examples(LONGER / "plane_sweep_stereo_aided")
+    figures.examples(WHOLE / "plane_sweep_guided")
     for page, made in PAGES.items():
         for name, table in made.items():
             fill(PROJECT / page, name, table())

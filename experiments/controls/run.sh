@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What the plane sweep of ../recipe_20k, which ships as paper_rig, makes of pairs from which something is taken that it was
+# What the plane sweep of ../recipe_40k, which ships as paper_rig, makes of pairs from which something is taken that it was
 # trained with. Nothing is trained. Results go beside this file.
 set -euo pipefail
 family=controls

@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# The plane sweep with auxiliary tasks on twice the schedule of ../recipe_10k; its weights are shipped as paper_rig. Results
-# go beside this file.
+# The plane sweep with auxiliary tasks on twice the schedule of ../recipe_10k. Results go beside this file.
 set -euo pipefail
 family=recipe_20k interval=1000
 source "$(dirname "$0")/../family.sh"
@@ -10,5 +9,3 @@ against half_the_schedule $family/plane_sweep_stereo_aided recipe_10k/plane_swee
 if [ -n "${REAL:-}" ]; then
     against half_the_schedule_real $family/plane_sweep_stereo_aided recipe_10k/plane_sweep_stereo_aided real
 fi
-.venv/bin/python -m stereo_occ.export checkpoint="$runs/plane_sweep_stereo_aided/best.ckpt" \
-    output=stereo_occ/weights/paper_rig metrics="$here/plane_sweep_stereo_aided/test.json"
