@@ -12,7 +12,9 @@ from runs import program
 
 from stereo_occ.cli import compose_config
 from stereo_occ.data import meshes as meshes_module
+from stereo_occ.data import prepare as prepare_module
 from stereo_occ.data.datamodule import PairsDataModule
+from stereo_occ.data.objects import list_objects
 from stereo_occ.data.prepare import prepare
 from stereo_occ.data.shard import Shard
 from stereo_occ.errors import UserError
@@ -89,6 +91,15 @@ def test_subsets_are_as_the_table_says(root, data_folder, test_shards, monkeypat
     }  # fmt: skip
     (batch,) = data.val_dataloader()
     assert {view.object_id for view in batch.ids} == {"m4"}
+
+
+def test_objects_that_are_listed_already_are_not_listed_again(root, data_folder, test_shards, monkeypatch):
+    typed = pairs(root, data_folder, f"data.table={root / 'table.csv'}")
+    objects = list_objects(typed, progress=False)
+    monkeypatch.setattr(prepare_module, "list_objects", lambda *_: pytest.fail("listed again"))
+    data = PairsDataModule(typed, 2, 100, 2, progress=False, only="test", objects=objects)
+    assert ids(data.subset("test")[0]) == ["m5", "m6"]
+    assert [file.object_id for file in data.prepared.skipped] == ["m7"]
 
 
 def test_training_without_objects_is_one_line(root, data_folder, test_shards, tmp_path):
