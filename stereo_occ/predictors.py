@@ -83,6 +83,7 @@ class LearnedPredictor:
     def logits(
         self, views: Sequence[ObjectView], pictures: StereoViews, points: Mapping[str, Tensor]
     ) -> dict[str, Tensor]:
+        """See :class:`Predictor`."""
         with torch.inference_mode(), self._autocast():
             code = self.model.encode(map_tensors(pictures, lambda tensor: tensor.to(self.device)))
             return {
@@ -91,6 +92,7 @@ class LearnedPredictor:
             }
 
     def mesh(self, view: ObjectView, picture: StereoViews, resolution: int) -> Trimesh:
+        """See :class:`Predictor`."""
         with self._autocast():
             pictures = map_tensors(picture, lambda tensor: tensor.to(self.device))
             return reconstruct(self.model, pictures, self.decision, resolution)

@@ -147,6 +147,15 @@ def _double(x_BCHW: Tensor) -> Tensor:
 
 
 def choose_stride(encoder: str, stride: int | None, strides: Sequence[int]) -> int:
+    """The stride asked for, or the encoder's coarsest.
+
+    Args:
+        encoder: its name, for messages.
+        strides: that it has features at, the finest first.
+
+    Raises:
+        UserError: on another stride.
+    """
     if stride is None:
         return strides[-1]
     if stride not in strides:
