@@ -26,6 +26,7 @@ from runs import (
     REPEATED,
     RUNS,
     SURFACES,
+    TWIN,
     WHOLE,
     load,
     rows_of,
@@ -55,7 +56,18 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
     },
     "experiments/seeds_10k/README.md": {
         "seeds": run_tables.seeds,
-        "over_mono_seeds": run_tables.over_mono_seeds,
+        "over_mono_seeds": partial(
+            run_tables.over_seeds,
+            MONO,
+            [name for name in REPEATED if name != MONO],
+            ("iou", "iou_unrotated", "handle_recall"),
+        ),
+        "pair": partial(
+            run_tables.over_seeds,
+            TWIN,
+            ["plane_sweep_guided"],
+            ("iou", "recall_2_visible", "recall_2_occluded", "handle_recall"),
+        ),
     },
     "experiments/field/README.md": {
         "field": run_tables.field,
@@ -145,7 +157,11 @@ def summary() -> dict[str, Any]:
         name: {
             where: {
                 "metrics": _differences(folders, [], where),
-                "over mono_scratch": _differences(folders, REPEATED[MONO], where),
+                **{
+                    f"over {other}": _differences(folders, REPEATED[other], where)
+                    for other in (MONO, TWIN)
+                    if other != name
+                },
             }
             for where in ("test", "real")
         }

@@ -153,14 +153,14 @@ def seeds() -> str:
     return cells.table(head, rows)
 
 
-def over_mono_seeds() -> str:
-    """What the repeated models have over mono, over objects and seeds."""
+def over_seeds(base: str, names: Sequence[str], metrics: Sequence[str]) -> str:
+    """What repeated models have over one of them, over objects and seeds."""
     results = load(HERE / "results.json")["seeds"]
     rows = []
-    for name in (name for name in REPEATED if name != MONO):
+    for name in names:
         for where in ("test", "real"):
-            for metric in ("iou", "iou_unrotated", "handle_recall"):
-                found = results[name][where]["over mono_scratch"].get(metric)
+            for metric in metrics:
+                found = results[name][where][f"over {base}"].get(metric)
                 if found:
                     rows.append([f"`{name}`", where, *cells.intervals(metric, found)])
     return cells.table(("", "objects", "", *CATEGORIES, "macro"), rows)

@@ -45,10 +45,11 @@ RUNS = {
     FREE / "plane_sweep_guided": f"experiment=recipe placement=free {GUIDED} steps=10000",
 }
 MONO = "mono_scratch"
+TWIN = "plane_sweep_guided_left"
 #: Runs of the recipe trained again from other seeds: by name, each training of it.
 REPEATED = {
-    name: [RECIPE / name, *(SEEDS / f"{name}_{seed}" for seed in (1, 2))]
-    for name in (MONO, "stereo", "plane_sweep_guided")
+    name: [RECIPE / name, *(SEEDS / f"{name}_{seed}" for seed in seeds)]
+    for name, seeds in ((MONO, (1, 2)), ("stereo", (1, 2)), (TWIN, (1,)), ("plane_sweep_guided", (1, 2)))
 }
 CATEGORIES = ("mug", "bowl", "bottle")
 
