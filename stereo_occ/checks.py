@@ -23,11 +23,11 @@ from stereo_occ.loggers.config import LoggerConfig, logger_problems
 from stereo_occ.models.build import build_model
 from stereo_occ.optimization import OPTIMIZERS, SCHEDULES
 from stereo_occ.packaged import is_there, shipped
+from stereo_occ.precision import PRECISIONS, on_gpu
 from stereo_occ.problems import nearest
 from stereo_occ.shapes.shape import CATEGORIES
 
 ACCELERATORS = ("cpu", "gpu", "auto")
-PRECISIONS = ("32-true", "bf16-mixed", "16-mixed")
 LARGEST_SIDE = 4096
 
 #: Of meshes per side of the cube and of samples, which have to be held in memory.
@@ -302,12 +302,8 @@ def _hardware(cfg: DictConfig) -> Iterator[str]:
     yield from _known("trainer.accelerator", trainer.accelerator, ACCELERATORS)
     if trainer.accelerator == "gpu" and not torch.cuda.is_available():
         yield "trainer.accelerator=gpu: PyTorch sees no GPU here; say trainer=cpu"
-    elif trainer.precision == "16-mixed" and not _on_gpu(trainer.accelerator):
-        yield "trainer.precision=16-mixed: processors have no half precision; say bf16-mixed or 32-true"
-
-
-def _on_gpu(accelerator: str) -> bool:
-    return accelerator == "gpu" or (accelerator == "auto" and torch.cuda.is_available())
+    elif trainer.precision == "16-mixed" and not on_gpu(trainer.accelerator):
+        yield "trainer.precision=16-mixed: processors have no half precision; say auto"
 
 
 def _processes(cfg: DictConfig) -> Iterator[str]:

@@ -141,7 +141,7 @@ class TrainerConfig:
     accelerator: str = MISSING
     devices: int = MISSING  # of each node, a training process for each; an evaluation is one process
     nodes: int = 1
-    precision: str = MISSING
+    precision: str = MISSING  # auto: what is fast here
     threads: int | None = None  # of torch; null leaves torch's choice
     workers: int = MISSING  # loader processes
     gradient_clip: float | None = None

@@ -15,6 +15,7 @@ from stereo_occ.decision import Decision
 from stereo_occ.geometry.camera import Camera, StereoRig
 from stereo_occ.geometry.pose import Pose
 from stereo_occ.models.base import OccupancyModel, StereoViews
+from stereo_occ.precision import chosen_precision, on_gpu
 from stereo_occ.reconstruction import reconstruct
 
 _PRECISION = {"32-true": None, "bf16-mixed": torch.bfloat16, "16-mixed": torch.float16}
@@ -74,11 +75,10 @@ class LearnedPredictor:
     """A trained network: it sees the pictures and their cameras, and nothing else."""
 
     def __init__(self, model: OccupancyModel, decision: Decision, accelerator: str, precision: str) -> None:
-        use_gpu = accelerator == "gpu" or (accelerator == "auto" and torch.cuda.is_available())
-        self.device = torch.device("cuda" if use_gpu else "cpu")
+        self.device = torch.device("cuda" if on_gpu(accelerator) else "cpu")
         self.model = model.to(self.device).eval()
         self.decision = decision
-        self.precision = precision
+        self.precision = chosen_precision(precision, accelerator)
 
     def logits(
         self, views: Sequence[ObjectView], pictures: StereoViews, points: Mapping[str, Tensor]

@@ -25,6 +25,7 @@ from stereo_occ.loggers.build import build_boards
 from stereo_occ.loggers.show import Show
 from stereo_occ.memory import keep_freed_memory
 from stereo_occ.metrics_file import WriteMetrics, best_iou
+from stereo_occ.precision import chosen_precision
 from stereo_occ.quiet import quiet_libraries
 from stereo_occ.resume import AtomicCheckpoints, SaveLatest, step_to_resume
 from stereo_occ.run_folder import OVERRIDES
@@ -150,7 +151,7 @@ def build_trainer(
         devices=typed.trainer.devices,
         num_nodes=typed.trainer.nodes,
         strategy="ddp" if typed.trainer.processes > 1 else "auto",
-        precision=typed.trainer.precision,  # type: ignore[arg-type]
+        precision=chosen_precision(typed.trainer.precision, typed.trainer.accelerator),  # type: ignore[arg-type]
         max_steps=typed.steps,
         max_epochs=-1,
         val_check_interval=typed.validation.interval,

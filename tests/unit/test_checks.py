@@ -79,7 +79,7 @@ def four_cores(monkeypatch):
         ("background.masked=2", "background.masked=2.0: is a share of the view pairs"),
         ("background.low=[0,0]", "background.low=[0.0, 0.0]: must be three values"),
         ("queries.box=2", "queries=[2.0, 0.0, 0.0]: box, outside and surface must be shares"),
-        ("trainer.precision=16", "trainer.precision=16: unknown; known: 16-mixed, 32-true, bf16-mixed"),
+        ("trainer.precision=16", "trainer.precision=16: unknown; known: 16-mixed, 32-true, auto, bf16-mixed"),
         ("trainer.accelerator=cup", "trainer.accelerator=cup: unknown; did you mean cpu"),
         ("trainer.devices=0", "trainer.devices=0: must be at least 1"),
         ("trainer.devices=3", "batch_size=16: must be a multiple of the 3 processes"),
@@ -94,7 +94,7 @@ def four_cores(monkeypatch):
         ("trainer.devices=65 batch_size=65", "trainer.devices=65: must be at most 64"),
         (
             "trainer.precision=16-mixed",
-            "trainer.precision=16-mixed: processors have no half precision; say bf16-mixed",
+            "trainer.precision=16-mixed: processors have no half precision; say auto",
         ),
         ("trainer.gradient_clip=-1", "trainer.gradient_clip=-1.0: must be above 0"),
         ("logger.mesh_resolution=0", "logger.mesh_resolution=0: must be at least 1"),
