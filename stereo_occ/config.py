@@ -264,9 +264,9 @@ def _refers(value: Any) -> bool:
 def register_schemas() -> None:
     """Tell Hydra the schemas, and OmegaConf two resolvers; safe to call again.
 
-    ``divide`` is whole and at least 1, ``rest`` what shares leave of 1. The store of schemas is no longer copied: Hydra
-    does so for every composition and every group it lists, but reads from it copies only.
+    ``divide`` is whole and at least 1, ``rest`` what shares leave of 1.
     """
+    # Hydra would copy all schemas for each composition and each group that it lists; those it reads are copies anyway.
     ConfigStore.__deepcopy__ = lambda store, memo: store  # type: ignore[attr-defined]
     OmegaConf.register_new_resolver("divide", lambda a, b: max(1, int(a) // int(b)), replace=True)
     OmegaConf.register_new_resolver("rest", lambda *shares: 1 - sum(shares), replace=True)
