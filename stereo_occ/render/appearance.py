@@ -40,6 +40,7 @@ class LightsConfig:
     ambient: list[float] = MISSING  # radiance of a white surface that no source reaches
     warmth: list[float] = MISSING  # of each source: red is (1 + warmth), blue (1 - warmth) times green
     sources: dict[str, LightSourceConfig] = MISSING
+    shadows: list[float] | None = None  # half width of their edges, object diagonals; null: nothing casts any
 
 
 @dataclass
@@ -79,6 +80,7 @@ class Appearance:
         metallic, roughness: 0 to 1.
         background_3: uint8 display RGB.
         reflection: how strongly windows and lamps are mirrored.
+        shadow: half width of shadows' edges, diagonals of the object; None: nothing casts any.
         finish: of the object with its texture; None: one colour.
         clutter: what is around the object; None: nothing.
     """
@@ -91,8 +93,14 @@ class Appearance:
     roughness: float
     background_3: NDArray[np.uint8]
     reflection: float = 0.0
+    shadow: float | None = None
     finish: Finish | None = None
     clutter: Clutter | None = None
+
+    @property
+    def plain(self) -> bool:
+        """Whether pyrender can draw it: one colour, nothing around, nothing mirrored, no shadows."""
+        return self.finish is None and self.clutter is None and self.shadow is None and not self.reflection
 
 
 def draw_appearance(
@@ -123,6 +131,7 @@ def draw_appearance(
         reflection=0.0
         if material.reflection is None
         else draw(material.reflection, "material.reflection", rng, 0, 5),
+        shadow=None if lights.shadows is None else draw(lights.shadows, "lights.shadows", rng, 0, 0.2),
     )
 
 

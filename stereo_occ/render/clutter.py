@@ -58,13 +58,13 @@ class Clutter:
     """Everything but the object, rig frame.
 
     Attributes:
-        vertices_V14, faces_F3: as :class:`~stereo_occ.render.surfaces.SurfaceDrawing` takes them.
+        vertices_V15, faces_F3: as :class:`~stereo_occ.render.surfaces.SurfaceDrawing` takes them.
         finishes: of things 1, 2, ...: the table, the wall, and what is on the table.
         contacts_C4: where the object and the things touch the table, and how far their shade reaches.
         up_3: unit vector.
     """
 
-    vertices_V14: NDArray[np.float32]
+    vertices_V15: NDArray[np.float32]
     faces_F3: NDArray[np.int64]
     finishes: list[Finish]
     contacts_C4: NDArray[np.float64]
@@ -127,6 +127,7 @@ def draw_clutter(
                     colors_V4,
                     texture_V3,
                     numbers_V1,
+                    np.ones((len(positions_V3), 1)),
                 ],
                 faces_F3 + offset,
             )

@@ -14,6 +14,7 @@ from stereo_occ.geometry.camera import Camera, StereoRig
 from stereo_occ.render.appearance import MAX_LIGHTS, Appearance
 from stereo_occ.render.gl import import_pyrender, process_renderer
 from stereo_occ.render.normals import split_at_creases
+from stereo_occ.render.openness import openness
 from stereo_occ.render.pixels import center_depth, mean_color, over
 from stereo_occ.render.texture import plain_finish
 from stereo_occ.render.vertices import SceneLight, object_vertices, surroundings
@@ -59,6 +60,7 @@ class StereoRenderer:
         self._material = self._pyrender.MetallicRoughnessMaterial()
         self._mesh_node: Any = None
         self._surfaces: Any = None
+        self._surfaces_open: bool | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -87,9 +89,9 @@ class StereoRenderer:
             positions=positions_V3, normals=normals_V3, indices=faces_F3, material=self._material
         )
         self._mesh_node = self._scene.add(self._pyrender.Mesh([primitive]))
-        self._surfaces_loaded = False
+        self._surfaces_open = None
         own_V3 = None if colors_V3 is None else colors_V3[source_V]
-        self._parts = object_vertices(positions_V3, normals_V3, own_V3), faces_F3
+        self._parts = mesh, positions_V3, normals_V3, own_V3, faces_F3
 
     def render(
         self, rig: StereoRig, rig_from_object: NDArray[np.float64], appearance: Appearance
@@ -109,7 +111,7 @@ class StereoRenderer:
         _check_rig(rig)
         if not np.linalg.det(rig_from_object[:3, :3]) > 0:
             raise UserError(f"rig_from_object: must not mirror the object, got {rig_from_object.tolist()}")
-        if appearance.finish is None and appearance.clutter is None and appearance.reflection == 0:
+        if appearance.plain:
             self._scene.set_pose(self._mesh_node, rig_from_object)
             self._set_appearance(appearance)
             views = [self._samples(camera) for camera in rig.cameras]
@@ -142,9 +144,7 @@ class StereoRenderer:
         """As :meth:`_samples`; the colour of what is not the object is not weighted by its alpha, which is 0."""
         if self._surfaces is None:
             self._surfaces = import_module("stereo_occ.render.surfaces").SurfaceDrawing()  # needs OpenGL
-        if not self._surfaces_loaded:
-            self._surfaces.load_object(*self._parts)
-            self._surfaces_loaded = True
+        self._load_surfaces(appearance.shadow is not None)
         finish, clutter = appearance.finish or plain_finish(appearance), appearance.clutter
         self._surfaces.load_things(*surroundings(clutter))
         light = SceneLight(
@@ -152,9 +152,11 @@ class StereoRenderer:
             appearance.light_color_L3,
             appearance.ambient,
             np.array([0.0, 1.0, 0.0]) if clutter is None else clutter.up_3,
+            appearance.shadow,
         )
         finishes = [finish, *([] if clutter is None else clutter.finishes)]
         self._surfaces.set_look(finishes, np.zeros((0, 4)) if clutter is None else clutter.contacts_C4, light)
+        self._surfaces.cast_shadows(rig_from_object, light)
         return [
             self._surfaces.samples(
                 self._supersampled(camera),
@@ -164,6 +166,14 @@ class StereoRenderer:
             )
             for camera in rig.cameras
         ]
+
+    def _load_surfaces(self, shadowed: bool) -> None:
+        if self._surfaces_open == shadowed:
+            return
+        mesh, positions_V3, normals_V3, own_V3, faces_F3 = self._parts
+        open_V = openness(mesh, positions_V3, normals_V3) if shadowed else np.ones(len(positions_V3))
+        self._surfaces.load_object(object_vertices(positions_V3, normals_V3, own_V3, open_V), faces_F3)
+        self._surfaces_open = shadowed
 
     def _supersampled(self, camera: Camera) -> Camera:
         factor = self._supersampling

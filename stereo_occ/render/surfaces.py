@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from stereo_occ.geometry.camera import Camera
 from stereo_occ.render.finish import Finish
 from stereo_occ.render.gl import import_pyrender, process_renderer
+from stereo_occ.render.shadows import ACROSS, SIDE, ShadowMaps
 from stereo_occ.render.vertices import ATTRIBUTES, SceneLight
 
 import_pyrender()
@@ -22,10 +23,16 @@ from OpenGL import GL  # noqa: E402 (the platform is chosen above)
 from OpenGL.GL import shaders  # noqa: E402
 
 #: Limits of the shader; the object is thing 0.
-MAX_THINGS = 16
+MAX_THINGS, MAX_LIGHTS = 16, 4
+
+#: What the first pass stores for the second, each in a texture of its own.
+STORED = ("position", "normal", "pattern", "open")
 
 #: What is nearer or farther than this along the optical axis is not drawn; units of the rig frame.
 NEAR, FAR = 0.05, 200.0
+
+#: How far off a surface its shadow is looked up, texels of the map.
+LIFT = 2.0
 
 
 class SurfaceDrawing:
@@ -35,20 +42,22 @@ class SurfaceDrawing:
         self._make_current()
         self._store = _linked("store.vert", "store.frag")
         self._light = _linked("everywhere.vert", "light.frag")
+        self._shadow = _linked("store.vert", "shadow.frag")
+        self._shadow_maps = ShadowMaps(MAX_LIGHTS)
         self._object, self._things = _VertexArray(), _VertexArray()
         self._no_vertices = GL.glGenVertexArrays(1)
         self._targets: dict[tuple[int, int], _Targets] = {}
         self._places: dict[str, int] = {}
 
-    def load_object(self, vertices_V14: NDArray[np.float32], faces_F3: NDArray[np.integer]) -> None:
+    def load_object(self, vertices_V15: NDArray[np.float32], faces_F3: NDArray[np.integer]) -> None:
         """The object, in its own frame."""
         self._make_current()
-        self._object.fill(vertices_V14, faces_F3)
+        self._object.fill(vertices_V15, faces_F3)
 
-    def load_things(self, vertices_V14: NDArray[np.float32], faces_F3: NDArray[np.integer]) -> None:
+    def load_things(self, vertices_V15: NDArray[np.float32], faces_F3: NDArray[np.integer]) -> None:
         """All that is around it, rig frame; none if there are no faces."""
         self._make_current()
-        self._things.fill(vertices_V14, faces_F3)
+        self._things.fill(vertices_V15, faces_F3)
 
     def set_look(
         self, finishes: Sequence[Finish], contacts_C4: NDArray[np.float64], light: SceneLight
@@ -68,8 +77,29 @@ class SurfaceDrawing:
                 GL.glUniform3fv(self._at(name), len(values_L3), values_L3.astype(np.float32))
         GL.glUniform1f(self._at("ambient"), light.ambient)
         GL.glUniform3f(self._at("up"), *light.up_3)
-        for unit, name in enumerate(("stored_position", "stored_normal", "stored_pattern")):
+        for unit, name in enumerate((*(f"stored_{name}" for name in STORED), "shadow_maps")):
             GL.glUniform1i(self._at(name), unit)
+
+    def cast_shadows(self, rig_from_object: NDArray[np.float64], light: SceneLight) -> None:
+        """Find what the lights of the next pictures do not reach."""
+        self._make_current()
+        cast = light.shadow is not None and len(light.from_L3) > 0
+        GL.glUseProgram(self._light)
+        GL.glUniform1f(self._at("shadow_edge"), light.shadow / (2 * ACROSS) if cast else -1.0)
+        if not cast:
+            return
+        diagonal = np.cbrt(np.linalg.det(rig_from_object[:3, :3]))
+        GL.glUniform1f(self._at("shadow_lift"), LIFT * 2 * ACROSS * diagonal / SIDE)
+        middle_3 = rig_from_object[:3, 3]
+
+        def draw(clip_from_rig: NDArray[np.float64]) -> None:
+            self._draw_all(self._shadow, clip_from_rig, rig_from_object, np.eye(4))
+
+        maps_L44 = self._shadow_maps.draw(light.from_L3, middle_3, float(diagonal), draw)
+        GL.glUseProgram(self._light)
+        GL.glUniformMatrix4fv(
+            self._at("map_from_rig"), len(maps_L44), GL.GL_TRUE, maps_L44.astype(np.float32)
+        )
 
     def samples(
         self,
@@ -107,14 +137,24 @@ class SurfaceDrawing:
         GL.glClear(GL.GL_DEPTH_BUFFER_BIT)
         (GL.glDisable if double_sided else GL.glEnable)(GL.GL_CULL_FACE)
         GL.glCullFace(GL.GL_BACK)
-        GL.glUseProgram(self._store)
-        _set_matrix(self._store, "clip_from_rig", _clip_from_camera(camera) @ camera.camera_from_rig)
-        _set_matrix(self._store, "rig_from_model", rig_from_object)
-        _set_matrix(self._store, "texture_from_model", texture_from_object)
+        clip_from_rig = _clip_from_camera(camera) @ camera.camera_from_rig
+        self._draw_all(self._store, clip_from_rig, rig_from_object, texture_from_object)
+
+    def _draw_all(
+        self,
+        program: int,
+        clip_from_rig: NDArray[np.float64],
+        rig_from_object: NDArray[np.float64],
+        texture_from_object: NDArray[np.float64],
+    ) -> None:
+        GL.glUseProgram(program)
+        _set_matrix(program, "clip_from_rig", clip_from_rig)
+        _set_matrix(program, "rig_from_model", rig_from_object)
+        _set_matrix(program, "texture_from_model", texture_from_object)
         self._object.draw()
         if self._things.count:
             for name in ("rig_from_model", "texture_from_model"):
-                _set_matrix(self._store, name, np.eye(4))
+                _set_matrix(program, name, np.eye(4))
             self._things.draw()
 
     def _light_pass(self, targets: "_Targets", camera: Camera) -> None:
@@ -128,6 +168,8 @@ class SurfaceDrawing:
         for unit, texture in enumerate(targets.textures):
             GL.glActiveTexture(GL.GL_TEXTURE0 + unit)
             GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
+        GL.glActiveTexture(GL.GL_TEXTURE0 + len(targets.textures))
+        GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, self._shadow_maps.texture)
         GL.glUniform3f(self._at("camera_position"), *camera.center)
         GL.glUniform4f(self._at("depth_from_rig"), *camera.camera_from_rig[2])
         GL.glBindVertexArray(self._no_vertices)
@@ -166,11 +208,11 @@ class _VertexArray:
             offset += components
         GL.glBindVertexArray(0)
 
-    def fill(self, vertices_V14: NDArray[np.float32], faces_F3: NDArray[np.integer]) -> None:
+    def fill(self, vertices_V15: NDArray[np.float32], faces_F3: NDArray[np.integer]) -> None:
         self.count = 3 * len(faces_F3)
         GL.glBindVertexArray(self._array)
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._vertices)
-        GL.glBufferData(GL.GL_ARRAY_BUFFER, np.ascontiguousarray(vertices_V14), GL.GL_DYNAMIC_DRAW)
+        GL.glBufferData(GL.GL_ARRAY_BUFFER, np.ascontiguousarray(vertices_V15), GL.GL_DYNAMIC_DRAW)
         indices = np.ascontiguousarray(faces_F3, np.uint32)
         GL.glBufferData(GL.GL_ELEMENT_ARRAY_BUFFER, indices, GL.GL_DYNAMIC_DRAW)
         GL.glBindVertexArray(0)
@@ -186,18 +228,19 @@ class _Targets:
 
     def __init__(self, width: int, height: int) -> None:
         self._size = width, height
-        self._textures = [int(name) for name in GL.glGenTextures(5)]
+        self._textures = [int(name) for name in GL.glGenTextures(len(STORED) + 2)]
         self._depth = GL.glGenRenderbuffers(1)
         GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, self._depth)
         GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, GL.GL_DEPTH_COMPONENT24, width, height)
-        formats = [(GL.GL_RGBA32F, GL.GL_RGBA)] * 3 + [(GL.GL_RGBA8, GL.GL_RGBA), (GL.GL_R32F, GL.GL_RED)]
+        four, one = (GL.GL_RGBA32F, GL.GL_RGBA), (GL.GL_R32F, GL.GL_RED)
+        formats = [four, four, four, one, (GL.GL_RGBA8, GL.GL_RGBA), one]
         for texture, (stored, given) in zip(self._textures, formats, strict=True):
             GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
             GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, stored, width, height, 0, given, GL.GL_FLOAT, None)
             for filtering in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
                 GL.glTexParameteri(GL.GL_TEXTURE_2D, filtering, GL.GL_NEAREST)
-        self.textures = self._textures[:3]
-        self.store, self.light = self._framebuffer(self.textures), self._framebuffer(self._textures[3:])
+        self.textures, pictures = self._textures[: len(STORED)], self._textures[len(STORED) :]
+        self.store, self.light = self._framebuffer(self.textures), self._framebuffer(pictures)
 
     def _framebuffer(self, textures: list[int]) -> int:
         framebuffer = int(GL.glGenFramebuffers(1))

@@ -140,8 +140,8 @@ def test_photographs_on_table_and_wall_change_colours_alone(renderer, mug):
     )
     np.testing.assert_array_equal(before.mask_2HW, after.mask_2HW)
     np.testing.assert_array_equal(before.depth_2HW, after.depth_2HW)
-    moved_N = pictured.vertices_V14[pictured.vertices_V14[:, 13] > 2, :3]
-    np.testing.assert_array_equal(moved_N, plain.vertices_V14[plain.vertices_V14[:, 13] > 2, :3])
+    moved_N = pictured.vertices_V15[pictured.vertices_V15[:, 13] > 2, :3]
+    np.testing.assert_array_equal(moved_N, plain.vertices_V15[plain.vertices_V15[:, 13] > 2, :3])
     around = before.mask_2HW == 0
     assert (before.rgb_2HW3[around] != after.rgb_2HW3[around]).any(axis=1).mean() > 0.5
 
@@ -212,7 +212,7 @@ def test_things_stand_on_the_table_beside_the_object(mug):
         floor = (pose.to_rig(mug.convex_hull.vertices) @ clutter.up_3).min()
         object_N3 = pose.to_rig(mug.vertices)
         for number in range(3, len(clutter.finishes) + 1):
-            points_N3 = clutter.vertices_V14[clutter.vertices_V14[:, 13] == number, :3]
+            points_N3 = clutter.vertices_V15[clutter.vertices_V15[:, 13] == number, :3]
             assert (points_N3 @ clutter.up_3).min() == pytest.approx(floor, abs=1e-5)
             flat = np.eye(3) - np.outer(clutter.up_3, clutter.up_3)
             gaps = np.linalg.norm((points_N3 @ flat)[::5, None] - (object_N3 @ flat)[None, ::40], axis=-1)

@@ -5,10 +5,16 @@ const int LIGHTS = 4;
 const float PI = 3.14159265;
 const float GAMMA = 2.2;
 const float DIELECTRIC = 0.04;
+const int TAPS = 5;
 
 uniform sampler2D stored_position;
 uniform sampler2D stored_normal;
 uniform sampler2D stored_pattern;
+uniform sampler2D stored_open;
+uniform sampler2DArrayShadow shadow_maps;
+uniform mat4 map_from_rig[LIGHTS];
+uniform float shadow_edge;  // half width, sides of a map; below 0: there are no shadows
+uniform float shadow_lift;  // off the surface, before the map is asked; units of the rig frame
 uniform vec4 finishes[4 * THINGS];
 uniform vec4 contacts[THINGS];  // where things stand, w: how far their shade reaches
 uniform int contact_count;
@@ -105,6 +111,19 @@ vec3 surroundings(vec3 towards, float roughness) {
     return seen;
 }
 
+// Share of a light that nothing keeps from a place: the map asked on a disc as wide as shadows' edges, turned at random.
+float reached(int light, vec3 place, vec3 n, ivec2 sample_at) {
+    vec3 at = (map_from_rig[light] * vec4(place + shadow_lift * n, 1.0)).xyz;
+    float border = 2.0 * max(abs(at.x - 0.5), abs(at.y - 0.5));
+    if (border >= 1.0) return 1.0;
+    float turn = 2.0 * PI * random(ivec3(sample_at, light)), share = 0.0;
+    for (int i = 0; i < TAPS; i++) {
+        float angle = turn + 2.39996 * float(i), far = shadow_edge * sqrt((float(i) + 0.5) / float(TAPS));
+        share += texture(shadow_maps, vec4(at.xy + far * vec2(cos(angle), sin(angle)), light, at.z));
+    }
+    return mix(share / float(TAPS), 1.0, smoothstep(0.85, 1.0, border));
+}
+
 void main() {
     ivec2 sample_at = ivec2(gl_FragCoord.xy);
     vec4 place = texelFetch(stored_position, sample_at, 0);
@@ -141,7 +160,8 @@ void main() {
             shade *= 1.0 - 0.75 * exp(-3.0 * dot(away, away));
         }
     }
-    vec3 lit = base * ambient;
+    float open = texelFetch(stored_open, sample_at, 0).r;
+    vec3 lit = base * ambient * open / (1.0 - base * (1.0 - open));  // what is kept out is lit by light from the object
     for (int i = 0; i < light_count; i++) {
         vec3 l = light_from[i], h = normalize(l + v);
         float nl = clamp(dot(n, l), 0.001, 1.0), nh = clamp(dot(n, h), 0.0, 1.0), vh = clamp(dot(v, h), 0.0, 1.0);
@@ -149,13 +169,14 @@ void main() {
         float hidden = nv / (nv * (1.0 - k) + k) * nl / (nl * (1.0 - k) + k);
         float spread = nh * nh * (a2 - 1.0) + 1.0;
         vec3 gloss = fresnel * hidden * a2 / (PI * spread * spread) / (4.0 * nl * nv + 0.001);
-        lit += nl * light_color[i] * ((1.0 - fresnel) * diffuse / PI + gloss);
+        float share = shadow_edge < 0.0 ? 1.0 : reached(i, place.xyz, n, sample_at);
+        lit += share * nl * light_color[i] * ((1.0 - fresnel) * diffuse / PI + gloss);
     }
     lit *= shade;
     if (f2.y > 0.0) {
         vec3 fresnel = mirrored + (1.0 - mirrored) * pow(1.0 - nv, 5.0);
         float clear = (1.0 - roughness) * (1.0 - roughness);
-        lit += f2.y * clear * fresnel * surroundings(reflect(-v, n), roughness) * shade;
+        lit += f2.y * clear * fresnel * surroundings(reflect(-v, n), roughness) * shade * open;
     }
     color = vec4(clamp(pow(lit, vec3(1.0 / GAMMA)), 0.0, 1.0), thing == 0 ? 1.0 : 0.0);
     depth = thing == 0 ? dot(depth_from_rig, vec4(place.xyz, 1.0)) : 0.0;

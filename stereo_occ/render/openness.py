@@ -1,0 +1,42 @@
+"""How much of the light from all around reaches a surface, where the object itself is in its way."""
+
+import numpy as np
+from numpy.typing import NDArray
+from trimesh import Trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+RAYS = 64
+
+#: How far off the surface rays begin, in diagonals of the mesh.
+LIFT = 1e-4
+
+
+def openness(
+    mesh: Trimesh, positions_V3: NDArray[np.float64], normals_V3: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Share ``(V,)`` of evenly diffuse light that reaches each vertex past ``mesh``, 0 to 1.
+
+    Ambient occlusion (Zhukov et al., "An Ambient Light Illumination Model", 1998): the same rays for every vertex, in
+    the frame of its normal, as dense as a matt surface weighs them.
+
+    Args:
+        positions_V3: on the mesh's surface.
+        normals_V3: unit vectors.
+    """
+    directions_R3 = _cosine_weighted(RAYS)
+    across_V3 = np.cross(normals_V3, np.eye(3)[np.abs(normals_V3).argmin(axis=1)])
+    across_V3 /= np.linalg.norm(across_V3, axis=1, keepdims=True)
+    frames_V33 = np.stack([across_V3, np.cross(normals_V3, across_V3), normals_V3], axis=1)
+    rays_VR3 = directions_R3 @ frames_V33
+    starts_V3 = positions_V3 + LIFT * mesh.scale * normals_V3
+    starts_VR3 = np.broadcast_to(starts_V3[:, None], rays_VR3.shape)
+    blocked = RayMeshIntersector(mesh).intersects_any(starts_VR3.reshape(-1, 3), rays_VR3.reshape(-1, 3))
+    open_V: NDArray[np.float64] = 1 - blocked.reshape(len(positions_V3), RAYS).mean(axis=1)
+    return open_V
+
+
+def _cosine_weighted(count: int) -> NDArray[np.float64]:
+    """Directions ``(count, 3)`` about +Z: a sunflower's points in the unit disc, lifted to the sphere."""
+    number_R = np.arange(count) + 0.5
+    radius_R, turn_R = np.sqrt(number_R / count), np.pi * (3 - np.sqrt(5)) * number_R
+    return np.stack([radius_R * np.cos(turn_R), radius_R * np.sin(turn_R), np.sqrt(1 - radius_R**2)], axis=1)
