@@ -22,7 +22,7 @@ from stereo_occ.shapes.procedural import procedural_shape
 SIDE, GAP = 112, 6  # pixels
 OBJECTS = (("mug", 3), ("bowl", 5), ("bottle", 8))
 
-FIELD = ["rig=rectified", "placement=table", "lights=random", "material=glossy", "texture=procedural"]
+FIELD = ["rig=rectified", "placement=table", "lights=room", "material=glossy", "texture=procedural"]
 
 DESK = ["background=clutter", "placement=table", "placement.diagonal=[0.5,0.7]"]
 
@@ -30,6 +30,7 @@ DESK = ["background=clutter", "placement=table", "placement.diagonal=[0.5,0.7]"]
 SHEETS: dict[str, tuple[list[str], bool]] = {
     "paper": ([], False),
     "lights": (["lights=random"], False),
+    "shadows": (["lights=room", *DESK], False),
     "material": (["material=varied"], False),
     "glossy": (["material=glossy", "lights=random"], False),
     "texture": (["texture=procedural", "texture.share=1"], False),

@@ -83,10 +83,10 @@ class SurfaceDrawing:
     def cast_shadows(self, rig_from_object: NDArray[np.float64], light: SceneLight) -> None:
         """Find what the lights of the next pictures do not reach."""
         self._make_current()
-        cast = light.shadow is not None and len(light.from_L3) > 0
+        edge = light.shadow if len(light.from_L3) else None
         GL.glUseProgram(self._light)
-        GL.glUniform1f(self._at("shadow_edge"), light.shadow / (2 * ACROSS) if cast else -1.0)
-        if not cast:
+        GL.glUniform1f(self._at("shadow_edge"), -1.0 if edge is None else edge / (2 * ACROSS))
+        if edge is None:
             return
         diagonal = np.cbrt(np.linalg.det(rig_from_object[:3, :3]))
         GL.glUniform1f(self._at("shadow_lift"), LIFT * 2 * ACROSS * diagonal / SIDE)
