@@ -22,7 +22,7 @@ FIXED = (
 
 
 class SaveLatest(Checkpoint):
-    """Keeps the latest state in ``path``: every ``interval`` steps and at the end.
+    """Keeps the latest state in ``path``: every ``interval`` steps, at the end, and when SIGTERM asks to stop.
 
     Where a validation is due at the same step it is saved after it, so that a resumed run neither skips nor repeats
     it, and knows its result.
@@ -32,6 +32,10 @@ class SaveLatest(Checkpoint):
         self.path = path
         self.interval = interval
         self.validation_interval = validation_interval
+        self.step = 0  # that a stopped run goes on from
+
+    def on_train_start(self, trainer: Trainer, pl_module: LightningModule) -> None:
+        self.step = trainer.global_step
 
     def on_train_batch_end(self, trainer: Trainer, *_: Any) -> None:
         if trainer.global_step % self.validation_interval:
@@ -41,8 +45,10 @@ class SaveLatest(Checkpoint):
         self._save(trainer)
 
     def _save(self, trainer: Trainer) -> None:
-        if trainer.global_step % self.interval == 0 or trainer.global_step == trainer.max_steps:
+        due = trainer.global_step % self.interval == 0 or trainer.global_step == trainer.max_steps
+        if due or trainer.received_sigterm:
             trainer.save_checkpoint(self.path)
+            self.step = trainer.global_step
 
 
 class AtomicCheckpoints(TorchCheckpointIO):

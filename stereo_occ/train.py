@@ -64,7 +64,8 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
         if overrides is not None:
             write_whole(folder / OVERRIDES, OmegaConf.to_yaml(list(overrides)).encode())
         boards = build_boards(typed.logger, folder, step)
-    callbacks = build_callbacks(cfg, typed, folder, boards)
+    kept = SaveLatest(latest, typed.validation.checkpoint_interval, typed.validation.interval)
+    callbacks = build_callbacks(cfg, typed, folder, boards, kept)
     trainer = build_trainer(typed, folder, callbacks, boards)
     try:
         trainer.fit(task, data, ckpt_path=latest if resume else None, weights_only=True)
@@ -73,7 +74,7 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
     ) as stop:  # how Lightning ends after Ctrl-C (code 1) or SIGTERM (code 0, as if it were done)
         sys.stderr.write(
             f"stereo_occ: stopped after step {trainer.global_step} of {typed.steps}; "
-            f"the same command with hydra.run.dir={folder} goes on\n"
+            f"the same command with hydra.run.dir={folder} goes on from step {kept.step}\n"
         )
         raise SystemExit(143 if isinstance(stop, SIGTERMException) else 130) from stop
     return trainer
@@ -104,9 +105,9 @@ def build_data(typed: TrainConfig, objects: Objects | None = None) -> PairsDataM
 
 
 def build_callbacks(
-    cfg: DictConfig, typed: TrainConfig, folder: Path, boards: Sequence[Board]
+    cfg: DictConfig, typed: TrainConfig, folder: Path, boards: Sequence[Board], kept: SaveLatest
 ) -> list[Callback]:
-    """Checkpoints (best and latest), metrics file, pictures, progress bar."""
+    """Checkpoints (the best, and ``kept``), metrics file, pictures, progress bar."""
     validation = typed.validation
     callbacks: list[Callback] = [
         StopIfDiverged(typed.logger.interval, validation.interval),
@@ -118,7 +119,7 @@ def build_callbacks(
             auto_insert_metric_name=False,
             enable_version_counter=False,
         ),
-        SaveLatest(folder / "last.ckpt", validation.checkpoint_interval, validation.interval),
+        kept,
         WriteMetrics(folder / METRICS_FILE),
     ]
     if validation.keep_all:

@@ -256,10 +256,11 @@ def test_what_is_evaluated_is_the_average_that_was_validated(aided, aided_run, t
 def test_a_run_stopped_by_hand_and_by_the_machine(workshop, run, tmp_path, monkeypatch, capsys):
     """Ctrl-C and SIGTERM end with the exit codes of their signals and say how to go on."""
     folder = tmp_path / "run"
-    for step, reason in ((4, KeyboardInterrupt()), (8, SIGTERMException())):
+    for step, saved, reason in ((4, 3, KeyboardInterrupt()), (8, 6, SIGTERMException())):
         stopped(workshop, monkeypatch, folder, step, reason=reason)
         assert capsys.readouterr().err == (
-            f"stereo_occ: stopped after step {step} of 12; the same command with hydra.run.dir={folder} goes on\n"
+            f"stereo_occ: stopped after step {step} of 12; the same command with hydra.run.dir={folder} goes on "
+            f"from step {saved}\n"
         )
     workshop.train(folder)
     assert same_weights(run, folder)
@@ -275,21 +276,23 @@ from stereo_occ import train
 from stereo_occ.cli import compose_config
 
 class Kill(Callback):
-    def on_train_batch_end(self, trainer, *_):
-        if trainer.global_step == 8:
-            os.kill(os.getpid(), signal.SIGKILL)
+    def on_train_batch_start(self, trainer, *_):
+        if trainer.global_step == 7:
+            os.kill(os.getpid(), getattr(signal, sys.argv[2]))
 
 build = train.build_callbacks
 train.build_callbacks = lambda *args: [*build(*args), Kill()]
-train.train(compose_config("train", sys.argv[2:]), Path(sys.argv[1]))
+train.train(compose_config("train", sys.argv[3:]), Path(sys.argv[1]))
 """
 
 
-def test_a_killed_process_goes_on(workshop, run, tmp_path):
+@pytest.mark.parametrize(("name", "code", "step"), [("SIGKILL", -9, 6), ("SIGTERM", 143, 8)])
+def test_a_killed_process_goes_on(workshop, run, tmp_path, name, code, step):
+    """From the last checkpoint; one that is asked to end saves where it is."""
     folder = tmp_path / "run"
-    killed = program("-c", KILLED, folder, *workshop.overrides(), cwd=tmp_path)
-    assert killed.returncode == -signal.SIGKILL, killed.stderr
-    assert read_checkpoint(folder / "last.ckpt")["global_step"] == 6
+    killed = program("-c", KILLED, folder, name, *workshop.overrides(), cwd=tmp_path)
+    assert killed.returncode == code, killed.stderr
+    assert read_checkpoint(folder / "last.ckpt")["global_step"] == step
     workshop.train(folder)
     assert same_weights(run, folder)
     assert history(run) == history(folder)
