@@ -19,6 +19,7 @@ from runs import (
     DISTANCES,
     FIELD,
     FREE,
+    FREE_WHOLE,
     HERE,
     LONGER,
     MONO,
@@ -30,6 +31,7 @@ from runs import (
     WHOLE,
     load,
     rows_of,
+    runs_of,
 )
 
 from stereo_occ.metrics.statistics import Difference, paired_bootstrap
@@ -53,6 +55,19 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
         "reached": partial(run_tables.reached, FREE),
         "over_mono": partial(run_tables.over_mono, FREE, "test", ("iou", "handle_recall")),
         "over_mono_real": partial(run_tables.over_mono, FREE, "real", ("iou",)),
+    },
+    "experiments/free_40k/README.md": {
+        "reached": partial(run_tables.reached, FREE_WHOLE),
+        "over_mono": partial(run_tables.over_mono, FREE_WHOLE, "test", ("iou", "handle_recall")),
+        "over_mono_real": partial(run_tables.over_mono, FREE_WHOLE, "real", ("iou",)),
+        "quarter": partial(
+            run_tables.less,
+            {
+                f"`{folder.name}`": folder.with_name(f"{folder.name}_against_quarter")
+                for folder in runs_of(FREE_WHOLE)
+            },
+            ("iou",),
+        ),
     },
     "experiments/seeds_10k/README.md": {
         "seeds": run_tables.seeds,
@@ -212,7 +227,7 @@ def fill(page: Path, name: str, text: str) -> None:
 def main() -> None:
     (HERE / "results.json").write_text(json.dumps(summary(), indent=1) + "\n")
     figures.curves()
-    for family in (RECIPE, WHOLE):
+    for family in (RECIPE, WHOLE, FREE_WHOLE):
         figures.recipe_curves(family)
     figures.examples(WHOLE / "plane_sweep_guided")
     for page, made in PAGES.items():

@@ -7,7 +7,7 @@ from typing import Any
 
 HERE = Path(__file__).parent
 FLOORS = HERE / "floors"
-SHORT, RECIPE, LONGER, WHOLE, FREE, SEEDS, FIELD, SURFACES, DISTANCES = (
+SHORT, RECIPE, LONGER, WHOLE, FREE, FREE_WHOLE, SEEDS, FIELD, SURFACES, DISTANCES = (
     HERE / name
     for name in (
         "laptop_4k",
@@ -15,6 +15,7 @@ SHORT, RECIPE, LONGER, WHOLE, FREE, SEEDS, FIELD, SURFACES, DISTANCES = (
         "recipe_20k",
         "recipe_40k",
         "free_10k",
+        "free_40k",
         "seeds_10k",
         "field",
         "field_surfaces",
@@ -43,6 +44,8 @@ RUNS = {
     FREE / "stereo": "experiment=recipe placement=free model=stereo steps=10000",
     FREE / "plane_sweep_stereo_aided": f"experiment=recipe placement=free {AIDED} steps=10000",
     FREE / "plane_sweep_guided": f"experiment=recipe placement=free {GUIDED} steps=10000",
+    FREE_WHOLE / "mono_scratch": "experiment=recipe placement=free model=mono_scratch scale.batch_size=8",
+    FREE_WHOLE / "plane_sweep_guided": f"experiment=recipe placement=free {GUIDED} scale.batch_size=8",
 }
 MONO = "mono_scratch"
 TWIN = "plane_sweep_guided_left"
