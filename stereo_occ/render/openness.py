@@ -21,11 +21,13 @@ def openness(
 
     Args:
         positions_V3: on the mesh's surface.
-        normals_V3: unit vectors.
+        normals_V3: unit vectors, or zeros, where all counts as open.
     """
     directions_R3 = _cosine_weighted(RAYS)
     across_V3 = np.cross(normals_V3, np.eye(3)[np.abs(normals_V3).argmin(axis=1)])
-    across_V3 /= np.linalg.norm(across_V3, axis=1, keepdims=True)
+    across_V3 /= np.linalg.norm(across_V3, axis=1, keepdims=True).clip(
+        1e-12
+    )  # faces without area have no normal
     frames_V33 = np.stack([across_V3, np.cross(normals_V3, across_V3), normals_V3], axis=1)
     rays_VR3 = directions_R3 @ frames_V33
     starts_V3 = positions_V3 + LIFT * mesh.scale * normals_V3

@@ -123,6 +123,7 @@ def test_openness_outside_of_a_ball_is_all_and_inside_nothing():
     ball = trimesh.creation.icosphere(subdivisions=4)
     np.testing.assert_array_equal(openness(ball, ball.vertices, ball.vertex_normals), 1)
     np.testing.assert_array_equal(openness(ball, ball.vertices, -ball.vertex_normals), 0)
+    np.testing.assert_array_equal(openness(ball, ball.vertices, np.zeros_like(ball.vertices)), 1)
 
 
 def test_shadows_change_nothing_else_that_is_drawn():
