@@ -1,23 +1,23 @@
 """What ``reconstruct`` makes of whole photographs, by what it is told of where the object is.
 
 Pairs of 960 x 540 pixels as a ZED Mini takes them (``rig=zed_mini``), of test objects of ``experiment=field`` in its
-scenes; the weights are ``field``. Writes ``results.json`` and ``table.md`` beside this file.
+scenes; the weights are ``field``. Writes ``results.json`` and ``table.md`` beside this file:
+
+    python -m experiments.boxes.measure
 """
 
 import argparse
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from omegaconf import OmegaConf
 from tqdm import tqdm
-from trimesh import Trimesh
 
+from experiments.whole_pairs import COLUMNS, Photographs, Told, measured
 from stereo_occ.calibration import Lens, RealCamera, RealPair
 from stereo_occ.cli import compose_config
 from stereo_occ.config import TrainConfig
@@ -26,33 +26,14 @@ from stereo_occ.data.objects import list_objects, members
 from stereo_occ.data.rigs import RectifiedRigConfig, draw_parallel
 from stereo_occ.data.scene import Scene, draw_scene
 from stereo_occ.errors import UserError
-from stereo_occ.geometry.camera import Camera, StereoRig, transform_points
-from stereo_occ.geometry.crop import Box
-from stereo_occ.metrics.size import size_errors
-from stereo_occ.metrics.solid import mesh_iou
+from stereo_occ.geometry.camera import Camera, StereoRig
 from stereo_occ.provenance import environment
-from stereo_occ.reconstructor import Reconstructor, SurfaceOptions
+from stereo_occ.reconstructor import Reconstructor
 from stereo_occ.render.appearance import draw_appearance
 from stereo_occ.render.sensor import photograph
 from stereo_occ.render.stereo import StereoRenderer
 
 HERE = Path(__file__).parent
-COLUMNS = ("iou", "height_error", "width_error", "center_error")
-
-
-@dataclass(frozen=True, eq=False)
-class Photographs:
-    """A pair as a user has it, and what only the renderer knows; lengths in metres, left camera's frame."""
-
-    rgb_2HW3: NDArray[np.uint8]
-    mask_2HW: NDArray[np.bool_]
-    pair: RealPair
-    left_from_object: NDArray[np.float64]
-    mesh: Trimesh
-
-    @property
-    def boxes_24(self) -> NDArray[np.float64]:
-        return np.array([list(vars(Box.of_mask(mask_HW)).values()) for mask_HW in self.mask_2HW])
 
 
 def by_hand(photographs: Photographs, error: float, rng: np.random.Generator) -> list[list[float]]:
@@ -62,7 +43,6 @@ def by_hand(photographs: Photographs, error: float, rng: np.random.Generator) ->
     return boxes_24.clip(-0.5, [width - 0.5, height - 0.5] * 2).tolist()
 
 
-Told = dict[str, Any]
 WAYS: dict[str, Callable[[Photographs, np.random.Generator], Told]] = {
     "masks": lambda p, rng: {"masks": tuple(p.mask_2HW)},
     "boxes, true": lambda p, rng: {"boxes": by_hand(p, 0, rng)},
@@ -132,18 +112,6 @@ def scenes(config: TrainConfig, count: int) -> Iterator[Photographs]:
                 left_from_object,
                 shape.mesh,
             )
-
-
-def measured(reconstruct: Reconstructor, photographs: Photographs, told: Told) -> list[float]:
-    """The values of ``COLUMNS``."""
-    left, right = photographs.rgb_2HW3
-    surface = SurfaceOptions(resolution=96)
-    mesh = reconstruct(left, right, photographs.pair, surface=surface, **told).mesh
-    pose = photographs.left_from_object
-    true = Trimesh(transform_points(photographs.mesh.vertices, pose), photographs.mesh.faces, process=False)
-    height, width = size_errors(mesh, true, pose, unit=1.0).values()
-    center = float(np.linalg.norm(mesh.bounds.mean(axis=0) - true.bounds.mean(axis=0)))
-    return [mesh_iou(mesh, true) or 0.0, height, width, center]
 
 
 def main() -> None:

@@ -40,13 +40,13 @@ def preview(
         scale = PANEL / image_HW3.shape[1]
         whole = Image.fromarray(image_HW3).resize((PANEL, max(1, round(scale * image_HW3.shape[0]))))
         pixels_V2 = (camera.pixels(np.asarray(mesh.vertices)) + 0.5) * scale - 0.5
-        top = _outlined(np.asarray(whole), pixels_V2, mesh, camera.center_3)
+        top = outlined(np.asarray(whole), pixels_V2, mesh, camera.center_3)
         if boxes is not None:
             top = _boxed(top, boxes[index], scale)
         large = _enlarged(view)
         below = np.rint(seen_by(image_HW3, camera, large)).astype(np.uint8)
         pixels_V2 = large.project(np.asarray(mesh.vertices))[0]
-        columns.append((top, _outlined(below, pixels_V2, mesh, camera.center_3)))
+        columns.append((top, outlined(below, pixels_V2, mesh, camera.center_3)))
     height = max(top.shape[0] for top, _ in columns)
     padded = [
         np.concatenate([np.pad(top, ((0, height - len(top)), (0, 0), (0, 0))), below])
@@ -70,9 +70,15 @@ def silhouette(
     return np.asarray(canvas)
 
 
-def _outlined(
+def outlined(
     image_HW3: NDArray[np.uint8], pixels_V2: NDArray[np.float64], mesh: Trimesh, center_3: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
+    """The picture with a mesh's outline drawn.
+
+    Args:
+        pixels_V2: where the mesh's vertices appear.
+        center_3: the camera's optical centre in the mesh's frame.
+    """
     height, width = image_HW3.shape[:2]
     facing_F = np.einsum("fi,fi->f", mesh.face_normals, center_3 - mesh.triangles_center) > 0
     mask_HW = silhouette(pixels_V2, mesh.faces, facing_F, width, height)
