@@ -2,7 +2,7 @@
 
     python -m experiments.path_traced.own_shader --root DIR
 
-Lights, materials and what is around are those of ``experiment=field`` (``texture=own``), sizes and sensors the same.
+Lights, materials and what is around are drawn as for the training of ``field``; sizes and sensors are the same.
 """
 
 import argparse
@@ -27,6 +27,9 @@ from stereo_occ.render.stereo import CV_FROM_GL, StereoRenderer
 
 OUTPUT = Path("outputs/path_traced_own_shader")
 
+#: The groups of the first training of ``field``, but for the objects' own colours.
+LOOKS = ["lights=random", "material=glossy", "texture=own", "background=clutter", "sensor=noisy"]
+
 
 def seen_from_left(rig: StereoRig, world_from_object: np.ndarray) -> Scene:
     """With the left camera's axes as the rig's (+Y up, +Z towards the cameras), as lights are drawn for."""
@@ -45,7 +48,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=OUTPUT)
     parser.add_argument("--views", type=int, default=2, help="of each object")
     options = parser.parse_args()
-    config = OmegaConf.to_object(compose_config("train", ["experiment=field", "texture=own"]))
+    config = OmegaConf.to_object(compose_config("train", LOOKS))
     assert isinstance(config, TrainConfig)
     sources = real_objects(options.root)
     numbers = [(number, view) for view in range(options.views) for number in range(len(sources))]

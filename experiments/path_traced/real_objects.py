@@ -25,9 +25,7 @@ Y_FROM_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 def real_objects(root: Path) -> list[ObjectSource]:
     """Those in a folder as docs/own-meshes.md describes it; an object's number is its place here."""
-    config = OmegaConf.to_object(
-        compose_config("train", ["experiment=field", "data=meshes", f"data.root={root}", "workers=1"])
-    )
+    config = OmegaConf.to_object(compose_config("train", ["data=meshes", f"data.root={root}", "workers=1"]))
     assert isinstance(config, TrainConfig)
     return members(list_objects(config, progress=True).sources, config, "all")
 

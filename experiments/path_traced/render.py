@@ -35,8 +35,8 @@ def exposed(light_2HW3: NDArray[np.float32], lamp_2HW: NDArray[np.bool_]) -> NDA
 
 
 def sensor() -> SensorConfig:
-    """Two small cameras, as the weights were trained with."""
-    config = OmegaConf.to_object(compose_config("train", ["experiment=field", "sensor=noisy"]))
+    """Two small cameras, which ``field`` was trained with."""
+    config = OmegaConf.to_object(compose_config("train", ["sensor=noisy"]))
     assert isinstance(config, TrainConfig)
     return config.sensor
 

@@ -78,7 +78,7 @@ def draw_thing(kind: str, sources: Sequence[ObjectSource], number: int, rng: np.
 
 def box(width: float, height: float, depth: float, lift: float = 0.0) -> Trimesh:
     """A box whose bottom is ``lift`` above the plane."""
-    mesh = creation.box([width, height, depth])
+    mesh: Trimesh = creation.box([width, height, depth])
     mesh.apply_translation([0, height / 2 + lift, 0])
     return mesh
 
