@@ -13,6 +13,7 @@ from typing import Any
 
 import figures
 import numpy as np
+import path_traced_tables
 import run_tables
 import study_tables
 from runs import (
@@ -114,6 +115,11 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
             },
             ("iou",),
         ),
+    },
+    "experiments/path_traced/README.md": {
+        "reached": path_traced_tables.reached,
+        "less_before": path_traced_tables.less_before,
+        "looks": path_traced_tables.looks,
     },
     "experiments/image_side/README.md": {"sides": partial(study_tables.changed, HERE / "image_side")},
     "experiments/baseline_angle/README.md": {

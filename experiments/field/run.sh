@@ -31,7 +31,7 @@ if [ -n "${REAL:-}" ]; then
     measure photographs data=meshes data.root="$REAL" data.views=4 texture=own rig=zed_mini background=photographs
     before=outputs/field_before/zed_mini_best
     judge $before checkpoint="${runs}_second/best.ckpt" views=4 data=meshes data.root="$REAL" data.views=4 texture=own rig=zed_mini \
-        lights=room 'sensor.exposure=[-0.5,1.5]'
+        lights=room sensor=noisy 'sensor.exposure=[-0.5,1.5]'
     differ zed_mini_against_before "$runs/zed_mini_best" $before
 fi
 collect "$runs" "$here"

@@ -1,0 +1,80 @@
+"""The tables of the path-traced pairs."""
+
+from pathlib import Path
+
+import cells
+import numpy as np
+from runs import CATEGORIES, HERE, load, rows_of
+
+from stereo_occ.metrics.statistics import paired_bootstrap
+
+TRACED = HERE / "path_traced"
+WAYS = ("masks", "both boxes", "left box alone")
+#: Weights and pictures, and where their results are.
+MEASURED = {
+    ("before", "path-traced"): TRACED / "before",
+    ("before", "the project's own, without shadows"): TRACED / "before" / "own_shader",
+    ("now", "path-traced"): TRACED,
+    ("now", "the project's own, without shadows"): TRACED / "own_shader",
+}
+
+
+def reached() -> str:
+    """IoU by what is told, and the errors with both boxes, of the weights of now and before."""
+    head = (
+        "weights", "pictures", *(f"`iou`, {way}" for way in WAYS), "both boxes: mug / bowl / bottle",
+        "height, width, centre off",
+    )  # fmt: skip
+    rows = []
+    for (weights, pictures), folder in MEASURED.items():
+        found = load(folder / "results.json")
+        boxes = found["both boxes"]
+        rows.append(
+            [
+                weights,
+                pictures,
+                *(f"{found[way]['iou']:.3f}" for way in WAYS),
+                " / ".join(f"{boxes[f'iou/{category}']:.2f}" for category in CATEGORIES),
+                ", ".join(f"{1000 * boxes[f'{of}_error']:.0f} mm" for of in ("height", "width", "center")),
+            ]
+        )
+    return cells.table(head, rows)
+
+
+def looks() -> str:
+    """With both boxes on path-traced pairs, by the look of the object."""
+    sides = {
+        name: load(TRACED / folder / "results.json") for name, folder in (("now", ""), ("before", "before"))
+    }
+    rows = [
+        [
+            key.removeprefix("both boxes, "),
+            str(values["pairs"]),
+            f"{values['iou']:.3f}",
+            f"{sides['before'][key]['iou']:.3f}",
+        ]
+        for key, values in sides["now"].items()
+        if key.startswith("both boxes, ")
+    ]
+    return cells.table(("object", "pairs", "`iou` now", "before"), rows)
+
+
+def less_before() -> str:
+    """The weights of now less those of before on path-traced pairs, with intervals over objects."""
+    now, before = (_by_pair(TRACED / folder / "per_object.csv") for folder in ("", "before"))
+    rows = []
+    for way in WAYS:
+        keys = [key for key in now if key[0] == way]
+        ours_1V, theirs_1V = (np.array([[side[key] for key in keys]]) for side in (now, before))
+        found = paired_bootstrap(ours_1V, theirs_1V, [key[1] for key in keys], [key[2] for key in keys])
+        bounds = (found[place] for place in (*CATEGORIES, "macro"))
+        rows.append([way, *(cells.interval((of.difference, of.low, of.high)) for of in bounds)])
+    return cells.table(("told", *CATEGORIES, "macro"), rows)
+
+
+def _by_pair(path: Path) -> dict[tuple[str, str, str, str], float]:
+    """IoU by what is told, category, object and view."""
+    return {
+        (row["told"], row["category"], row["object_id"], row["view"]): float(row["iou"])
+        for row in rows_of(path)
+    }
