@@ -34,7 +34,7 @@ def reached() -> str:
                 weights,
                 pictures,
                 *(f"{found[way]['iou']:.3f}" for way in WAYS),
-                " / ".join(f"{boxes[f'iou/{category}']:.2f}" for category in CATEGORIES),
+                cells.parts({category: boxes[f"iou/{category}"] for category in CATEGORIES}),
                 ", ".join(f"{1000 * boxes[f'{of}_error']:.0f} mm" for of in ("height", "width", "center")),
             ]
         )
@@ -43,17 +43,15 @@ def reached() -> str:
 
 def looks() -> str:
     """With both boxes on path-traced pairs, by the look of the object."""
-    sides = {
-        name: load(TRACED / folder / "results.json") for name, folder in (("now", ""), ("before", "before"))
-    }
+    now, before = (load(folder / "results.json") for folder in (TRACED, TRACED / "before"))
     rows = [
         [
             key.removeprefix("both boxes, "),
             str(values["pairs"]),
             f"{values['iou']:.3f}",
-            f"{sides['before'][key]['iou']:.3f}",
+            f"{before[key]['iou']:.3f}",
         ]
-        for key, values in sides["now"].items()
+        for key, values in now.items()
         if key.startswith("both boxes, ")
     ]
     return cells.table(("object", "pairs", "`iou` now", "before"), rows)
@@ -61,7 +59,7 @@ def looks() -> str:
 
 def less_before() -> str:
     """The weights of now less those of before on path-traced pairs, with intervals over objects."""
-    now, before = (_by_pair(TRACED / folder / "per_object.csv") for folder in ("", "before"))
+    now, before = (_by_pair(folder / "per_object.csv") for folder in (TRACED, TRACED / "before"))
     rows = []
     for way in WAYS:
         keys = [key for key in now if key[0] == way]

@@ -46,7 +46,7 @@ class Light:
     """A rectangle that shines to one side, or a ball.
 
     Attributes:
-        corner_from_unit: 4x4, from the square [-1, 1]^2 (it shines along +Z) or from the ball of radius 1.
+        world_from_unit: 4x4, from the square [-1, 1]^2 (it shines along +Z) or from the ball of radius 1.
         radiance_3: linear.
         ball: whether it is one.
     """

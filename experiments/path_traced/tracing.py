@@ -21,11 +21,10 @@ from stereo_occ.geometry.camera import Camera, transform_points  # noqa: E402
 from stereo_occ.geometry.crop import Box  # noqa: E402
 from stereo_occ.render.finish import root_of_linear  # noqa: E402
 from stereo_occ.render.normals import split_at_creases  # noqa: E402
+from stereo_occ.render.stereo import CREASE_ANGLE  # noqa: E402
 
 #: Mitsuba's cameras look along +Z with +X left and +Y up.
 CV_FROM_MITSUBA = np.diag([-1.0, -1.0, 1.0, 1.0])
-
-CREASE_ANGLE = np.radians(40)
 
 #: Samples per pixel of the whole image, which is cleaned, and of the object, which is not.
 SAMPLES, CLOSE_SAMPLES = 4, 64

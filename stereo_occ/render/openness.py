@@ -23,18 +23,17 @@ def openness(
         positions_V3: on the mesh's surface.
         normals_V3: unit vectors, or zeros, where all counts as open.
     """
-    directions_R3 = _cosine_weighted(RAYS)
     across_V3 = np.cross(normals_V3, np.eye(3)[np.abs(normals_V3).argmin(axis=1)])
     across_V3 /= np.linalg.norm(across_V3, axis=1, keepdims=True).clip(
         1e-12
     )  # faces without area have no normal
     frames_V33 = np.stack([across_V3, np.cross(normals_V3, across_V3), normals_V3], axis=1)
-    rays_VR3 = directions_R3 @ frames_V33
     starts_V3 = positions_V3 + LIFT * mesh.scale * normals_V3
-    starts_VR3 = np.broadcast_to(starts_V3[:, None], rays_VR3.shape)
-    blocked = RayMeshIntersector(mesh).intersects_any(starts_VR3.reshape(-1, 3), rays_VR3.reshape(-1, 3))
-    open_V: NDArray[np.float64] = 1 - blocked.reshape(len(positions_V3), RAYS).mean(axis=1)
-    return open_V
+    rays = RayMeshIntersector(mesh)
+    blocked_V = np.zeros(len(positions_V3))
+    for direction_3 in _cosine_weighted(RAYS):
+        blocked_V += rays.intersects_any(starts_V3, direction_3 @ frames_V33)
+    return 1 - blocked_V / RAYS
 
 
 def _cosine_weighted(count: int) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereo_occ.geometry.camera import Camera
+from stereo_occ.render.appearance import MAX_LIGHTS
 from stereo_occ.render.finish import Finish
 from stereo_occ.render.gl import import_pyrender, process_renderer
 from stereo_occ.render.shadows import ACROSS, SIDE, ShadowMaps
@@ -23,7 +24,7 @@ from OpenGL import GL  # noqa: E402 (the platform is chosen above)
 from OpenGL.GL import shaders  # noqa: E402
 
 #: Limits of the shader; the object is thing 0.
-MAX_THINGS, MAX_LIGHTS = 16, 4
+MAX_THINGS = 16
 
 #: What the first pass stores for the second, each in a texture of its own.
 STORED = ("position", "normal", "pattern", "open")
