@@ -14,7 +14,8 @@ mitsuba.set_variant("llvm_ad_rgb")
 drjit.set_thread_count(1)
 
 from experiments.path_traced.cleaning import cleaned  # noqa: E402
-from experiments.path_traced.scenes import Light, Scene  # noqa: E402
+from experiments.path_traced.room import Light  # noqa: E402
+from experiments.path_traced.scenes import Scene  # noqa: E402
 from experiments.path_traced.surfaces import Surface  # noqa: E402
 from experiments.path_traced.things import Thing  # noqa: E402
 from stereo_occ.geometry.camera import Camera, transform_points  # noqa: E402
