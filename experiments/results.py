@@ -40,7 +40,8 @@ from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 PROJECT = HERE.parent
 #: Pages and the tables in them, each between ``<!-- results:NAME -->`` and ``<!-- results:end -->``.
 PAGES: dict[str, dict[str, Callable[[], str]]] = {
-    "README.md": {"trained": run_tables.trained},
+    "README.md": {"answer": run_tables.answer},
+    "experiments/README.md": {"trained": run_tables.trained},
     "docs/metrics.md": {"decision": study_tables.decision, "floors": study_tables.floors},
     "docs/models.md": {
         "cost": study_tables.cost,

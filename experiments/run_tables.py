@@ -8,11 +8,13 @@ from runs import (
     CATEGORIES,
     DISTANCES,
     FIELD,
+    FREE_WHOLE,
     HERE,
     MONO,
     REPEATED,
     RUNS,
     SURFACES,
+    WHOLE,
     load,
     metrics_of,
     runs_of,
@@ -33,6 +35,38 @@ LOOKS = {
     "glossy_none": "glossy, plain",
     "glossy_procedural": "glossy, patterned",
 }
+
+#: Rows of the answer to the paper's question: the name of the run, and what a reader is told of it.
+ASKED = {
+    MONO: "one view: ResNet-18",
+    "stereo": "a pair: the paper's stereo network",
+    "plane_sweep_guided": "a calibrated pair: `plane_sweep_guided`",
+}
+
+
+def answer() -> str:
+    """What the paper asks, on its whole schedule: object as it is placed there, and anywhere in view."""
+    head = (
+        "40,000 iterations", "`iou` (mug / bowl / bottle)", "over ResNet-18", "real objects",
+        "anywhere, of any size: `iou`", "over ResNet-18", "real objects",
+    )  # fmt: skip
+    results = load(HERE / "results.json")
+    rows = []
+    for name, text in ASKED.items():
+        row = [text]
+        for family in (WHOLE, FREE_WHOLE):
+            if family / name not in RUNS:
+                row += ["", "", ""]
+                continue
+            over = results[f"{family.name}/{name}"]["test"].get(f"over {MONO}")
+            real = metrics_of(family / name, "real")["test/iou"]
+            row += [
+                cells.iou(metrics_of(family / name)),
+                cells.interval(over and over["iou"]["macro"]),
+                f"{real:.3f}",
+            ]
+        rows.append(row)
+    return cells.table(head, rows)
 
 
 def trained() -> str:

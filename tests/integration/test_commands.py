@@ -111,7 +111,11 @@ def test_a_command_of_the_pages_composes_without_problems(command, tmp_path, mon
     assert [problem for problem in problems if "pip install 'stereo-occ[" not in problem] == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page",
+    [*PAGES, *sorted((CHECKOUT / "experiments").rglob("README.md"))],
+    ids=lambda page: str(page.relative_to(CHECKOUT)),
+)
 def test_links_lead_somewhere(page):
     """To files of this repository, and to headings in them."""
     text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
@@ -132,6 +136,13 @@ def test_the_readme_leads_to_every_page():
     assert [
         page.name for page in PAGES if page.parent.name == "docs" and f"(docs/{page.name})" not in readme
     ] == []
+
+
+def test_the_page_of_experiments_leads_to_every_folder_with_a_run():
+    page = (CHECKOUT / "experiments" / "README.md").read_text()
+    runs = {path.parent.name for path in (CHECKOUT / "experiments").glob("*/run.sh")}
+    assert runs
+    assert {name for name in runs if f"({name}/" not in page} == set()
 
 
 def test_the_make_targets_of_the_readme_exist():
