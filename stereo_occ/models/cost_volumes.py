@@ -128,8 +128,8 @@ class PlaneSweep(CostVolume):
         B, C, H, W = left_BCHW.shape
         height, width = views.left_BCHW.shape[-2:]
         points_BN3 = sweep_points(
-            views.K_B233[:, 0].float(),
-            views.camera_from_rig_B244[:, 0].float(),
+            views.K_B233[:, 0],
+            views.camera_from_rig_B244[:, 0],
             self.slices,
             H,
             W,
@@ -159,14 +159,16 @@ def sweep_points(
     Returns:
         ``(B, planes * height * width, 3)``, rig frame, metres; the planes outermost, then the rows.
     """
-    R_B33, t_B3 = camera_from_rig_B44[:, :3, :3], camera_from_rig_B44[:, :3, 3]
-    near_B, far_B = (t_B3[:, 2] - WORKING_RADIUS).clamp(min=NEAREST), t_B3[:, 2] + WORKING_RADIUS
-    share_D = torch.linspace(0, 1, planes, device=K_B33.device)
-    depths_BD = 1 / torch.lerp(1 / near_B[:, None], 1 / far_B[:, None], share_D)
-    rays_BP3 = cell_pixels(height, width, stride, K_B33.device) @ torch.linalg.inv(K_B33).mT
-    local_BN3 = (depths_BD[:, :, None, None] * rays_BP3[:, None]).flatten(1, 2)
-    points_BN3: Tensor = (local_BN3 - t_B3[:, None]) @ R_B33
-    return points_BN3
+    with torch.autocast(K_B33.device.type, enabled=False):
+        K_B33, camera_from_rig_B44 = K_B33.float(), camera_from_rig_B44.float()
+        R_B33, t_B3 = camera_from_rig_B44[:, :3, :3], camera_from_rig_B44[:, :3, 3]
+        near_B, far_B = (t_B3[:, 2] - WORKING_RADIUS).clamp(min=NEAREST), t_B3[:, 2] + WORKING_RADIUS
+        share_D = torch.linspace(0, 1, planes, device=K_B33.device)
+        depths_BD = 1 / torch.lerp(1 / near_B[:, None], 1 / far_B[:, None], share_D)
+        rays_BP3 = cell_pixels(height, width, stride, K_B33.device) @ torch.linalg.inv(K_B33).mT
+        local_BN3 = (depths_BD[:, :, None, None] * rays_BP3[:, None]).flatten(1, 2)
+        points_BN3: Tensor = (local_BN3 - t_B3[:, None]) @ R_B33
+        return points_BN3
 
 
 def shift(features_BCHW: Tensor, disparities: Sequence[int]) -> Tensor:

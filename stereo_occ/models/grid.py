@@ -65,7 +65,9 @@ class Locator(nn.Module):
         weights_BN = self.attention(features_BCDHW).flatten(1).float().softmax(dim=1)
         pooled_BC = torch.einsum("bcn,bn->bc", features_BCDHW.flatten(2).float(), weights_BN)
         share_B = torch.sigmoid(self.size(pooled_BC).float()).squeeze(1)
-        return Grid(weights_BN @ self.centers_N3, SMALLEST + (1 - SMALLEST) * share_B)
+        with torch.autocast(weights_BN.device.type, enabled=False):
+            center_B3 = weights_BN @ self.centers_N3
+        return Grid(center_B3, SMALLEST + (1 - SMALLEST) * share_B)
 
 
 def locator_loss(grid: Grid, points_BN3: Tensor, occupied_BN: Tensor) -> Tensor:

@@ -55,16 +55,14 @@ def read_photo(path: Path, name: str) -> Photo:
         UserError: if there is no such file, or it is no image.
     """
     image = _open(path, name)
-    alpha = image.getchannel("A") if "A" in image.getbands() or "transparency" in image.info else None
     if image.mode.startswith(("I", "F")):
         rgb_HW3 = np.repeat(_to_bytes(np.asarray(image))[..., None], 3, axis=2)
         return Photo(rgb_HW3)
-    if "transparency" in image.info and alpha is None:
-        alpha = image.convert("RGBA").getchannel("A")
-    mask_HW = None if alpha is None else np.asarray(alpha) >= OPAQUE
-    if mask_HW is not None and mask_HW.all():
-        mask_HW = None
-    return Photo(np.asarray(image.convert("RGB")), mask_HW)
+    if not image.has_transparency_data:
+        return Photo(np.asarray(image.convert("RGB")))
+    rgba_HW4 = np.asarray(image.convert("RGBA"))
+    mask_HW = rgba_HW4[..., 3] >= OPAQUE
+    return Photo(rgba_HW4[..., :3], None if mask_HW.all() else mask_HW)
 
 
 def read_mask(path: Path, name: str, size: tuple[int, int]) -> NDArray[np.bool_]:

@@ -115,6 +115,7 @@ CASES = [
     Case("8 bit grey", images(lambda image: image.convert("L")), both(), None),
     Case("16 bit grey", images(grey16), both(), None),
     Case("transparent around the object", images(cut_out), both(), None),
+    Case("transparent, of few colours", images(lambda image: cut_out(image).quantize(255)), both(), None),
     Case("masks", images(mask), {"left_mask": "left_x.png", "right_mask": "right_x.png"}, None),
     Case("half the size", images(lambda image: image.resize((480, 270), Image.Resampling.BOX)), both(), None),
     Case("two sizes", images(lambda image: image.resize((480, 270))), {"left": "left_x.png"}, None),

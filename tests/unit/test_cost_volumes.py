@@ -109,11 +109,19 @@ def test_shift_beyond_the_image_leaves_nothing():
     assert (shift(torch.ones(1, 1, 1, 4), [4, -4, 9]) == 0).all()
 
 
-def test_volumes_are_float32_under_autocast():
-    left = torch.full((1, 8, 2, WIDTH), 1.001, dtype=torch.bfloat16)
+@pytest.mark.parametrize(
+    "volume",
+    [Correlation(8, disparities=SIGNED), Groupwise(8, disparities=SIGNED, groups=2), PlaneSweep(8, planes=16)],
+    ids=lambda volume: type(volume).__name__,
+)
+def test_autocast_costs_volumes_no_digit(volume):
+    """Features may be of half precision; where they are looked up, and their products, are not."""
+    features = torch.randn(2, 8, WIDTH, WIDTH, generator=torch.Generator().manual_seed(0)).bfloat16()
+    expected = volume(features, features.flip(-1), VIEWS)
     with torch.autocast("cpu", torch.bfloat16):
-        volume = Correlation(8, disparities=SIGNED)(left, left, VIEWS)
-    assert volume.dtype == torch.float32
+        found = volume(features, features.flip(-1), VIEWS)
+    assert found.dtype == torch.float32
+    assert torch.equal(found, expected)
 
 
 def test_groups_must_divide_the_channels():
