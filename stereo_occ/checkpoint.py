@@ -51,7 +51,8 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     """The contents of a checkpoint file; ``[KEY]["config"]`` is the training configuration, ``[KEY]["objects"]`` the
     identities of the training's objects by subset (missing where it was written before these were noted).
 
-    Exported weights (``.safetensors``, or the name of some that are shipped) read as the checkpoint that they are of.
+    Exported weights (``.safetensors``, or the name of some that are shipped) read as the checkpoint that they are of;
+    their ``["metrics"]`` are those that they were exported with.
 
     Raises:
         UserError: the file is damaged, holds more than plain data, or is of another version.
@@ -62,6 +63,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
             KEY: {"version": VERSION, "config": description["config"]},
             "state_dict": state_dict,
             "global_step": description.get("step"),
+            "metrics": description.get("metrics"),
         }
         return _checked(checkpoint, path)
     try:

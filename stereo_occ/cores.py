@@ -7,6 +7,13 @@ from collections.abc import Iterator
 PER_CORE = 16
 
 
+def available_cores() -> int:
+    """Those that this process may use: fewer than the machine has under Slurm, taskset or in a container."""
+    if hasattr(os, "sched_getaffinity"):  # of Linux
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def beyond_cores(key: str, count: int) -> Iterator[str]:
     """The problem of a setting that asks for more threads or processes than this machine can take."""
     cores = os.cpu_count() or 1

@@ -17,6 +17,8 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
 
+from stereo_occ.cores import available_cores
+
 PYTHON = (3, 11)
 CPU_FLAGS = ("avx2", "avx512f", "avx512_bf16", "avx512_fp16", "amx_bf16")
 
@@ -71,7 +73,10 @@ def machine(remedies: list[str]) -> list[tuple[str, str]]:
     return [
         ("system", platform.platform()),
         ("Python", f"{platform.python_version()} ({sys.executable})"),
-        ("processor", f"{_cores()} of {os.cpu_count()} cores; {model}; {flags or 'no ' + CPU_FLAGS[0]}"),
+        (
+            "processor",
+            f"{available_cores()} of {os.cpu_count()} cores; {model}; {flags or 'no ' + CPU_FLAGS[0]}",
+        ),
         ("load", _load()),
         ("memory", memory),
         ("free disk here", f"{free:.0f} GB{note}"),
@@ -129,7 +134,7 @@ def speed(remedies: list[str]) -> list[tuple[str, str]]:
         remedies += [f"rendering: {render['error']}"] if render["error"] else []
     else:
         seconds = {name: render["object"] + views * render["pair"] for name, views in VIEWS.items()}
-        minutes = {name: OBJECTS * each / _cores() / 60 for name, each in seconds.items()}
+        minutes = {name: OBJECTS * each / available_cores() / 60 for name, each in seconds.items()}
         estimates = ", ".join(f"scale={name} ~ {value:.0f} min" for name, value in minutes.items())
         rows.append(
             ("rendering", f"{1 / render['pair']:.0f} pairs of 64 px a second on one core; {estimates}")
@@ -157,14 +162,10 @@ def _probe(what: str) -> dict[str, Any]:
         return {"error": str(error)}
 
 
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def _load() -> str:
     load = os.getloadavg()[0]
     return f"{load:.1f} processes" + (
-        " (busy: what follows would be faster alone)" if load > 0.5 * _cores() else ""
+        " (busy: what follows would be faster alone)" if load > 0.5 * available_cores() else ""
     )
 
 

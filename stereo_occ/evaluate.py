@@ -129,6 +129,7 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     metrics = _metrics(result, threshold)
     skipped = [vars(file) for file in data.prepared.skipped]
     write_csv(folder / "per_object.csv", result.rows)
+    (folder / "skipped.csv").unlink(missing_ok=True)  # of a former evaluation
     if skipped:
         write_csv(folder / "skipped.csv", skipped)
     write_json(folder / "curves.json", _curves(result))

@@ -2,19 +2,20 @@
 
 import json
 import logging
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
-from stereo_occ.checkpoint import KEY, read_checkpoint
+from stereo_occ.checkpoint import KEY
 from stereo_occ.cli import entry_point
 from stereo_occ.errors import UserError
 from stereo_occ.inference_config import ExportConfig
 from stereo_occ.model_card import model_card, training_command
 from stereo_occ.onnx_export import export_onnx
 from stereo_occ.packaged import SUFFIX, write_description, write_weights
-from stereo_occ.trained import load_trained
+from stereo_occ.trained import load_trained, read_named, trained_model
 from stereo_occ.writing import in_the_way, write_whole
 
 logger = logging.getLogger(__name__)
@@ -41,13 +42,14 @@ def export(cfg: DictConfig) -> list[Path]:
     """
     settings = OmegaConf.to_object(cfg)
     assert isinstance(settings, ExportConfig)
-    trained = load_trained(settings.checkpoint)
-    checkpoint = read_checkpoint(Path(settings.checkpoint))
-    run, prefix = Path(settings.checkpoint).parent, Path(settings.output)
+    checkpoint = read_named(settings.checkpoint)
+    trained = trained_model(checkpoint, settings.checkpoint)
+    again = "metrics" in checkpoint  # exported before: what lies beside them is not of their training
+    run, prefix = None if again else Path(settings.checkpoint).parent, Path(settings.output)
     description = {
         "step": trained.step,
         "threshold": trained.decision.threshold,
-        "metrics": _metrics(settings.metrics, run),
+        "metrics": _metrics(settings.metrics, checkpoint, run),
         "config": checkpoint[KEY]["config"],
     }
     weights, _, card = outputs(settings.output)
@@ -55,7 +57,8 @@ def export(cfg: DictConfig) -> list[Path]:
     state = {name: state[name] for name in state if name == "threshold" or name.startswith("model.")}
     write_weights(weights, description, state, settings.half)
     parameters = sum(parameter.numel() for parameter in trained.model.parameters())
-    text = model_card(prefix.name, description, parameters, weights.stat().st_size, training_command(run))
+    command = None if run is None else training_command(run)
+    text = model_card(prefix.name, description, parameters, weights.stat().st_size, command)
     write_whole(card, text.encode())
     written = [weights, weights.with_suffix(".json"), card]
     if settings.onnx:
@@ -69,19 +72,21 @@ def export(cfg: DictConfig) -> list[Path]:
     return written
 
 
-def _metrics(path: str | None, run: Path) -> dict[str, Any]:
-    """Of an evaluation's ``metrics.json``, or a training's best validation."""
-    file = Path(path) if path else run / "metrics.json"
+def _metrics(path: str | None, checkpoint: Mapping[str, Any], run: Path | None) -> dict[str, Any]:
+    """Of an evaluation's ``metrics.json``; else of the checkpoint's validation, or what exported weights came with."""
+    if path is None and run is None:
+        return checkpoint["metrics"] or {}
+    file = run / "metrics.json" if path is None else Path(path)
     if path is None and not file.is_file():
         return {}
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-        metrics = content["metrics"] if "metrics" in content else content["best"]
-        if not isinstance(metrics, dict):
-            raise TypeError("metrics have names")
+        if path is None:
+            steps = {entry["step"]: entry for entry in content["history"]}
+            return dict(steps.get(checkpoint["global_step"], {}))
+        return dict(content["metrics"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise UserError(f"metrics={file}: cannot be read; give the metrics.json of an evaluation") from error
-    return metrics
 
 
 @entry_point("export", check_export)

@@ -71,8 +71,10 @@ class ViewKeeper:
         kept = KeptView(shard.category, shard.object_id, view.view, self.folder / name, rig)
         kept.path.parent.mkdir(parents=True, exist_ok=True)
         for kind, mesh in (("predicted", predicted), ("true", true)):
+            path = kept._file(f"{kind}.glb")
+            path.unlink(missing_ok=True)  # of a former evaluation
             if len(mesh.faces):
-                with whole_file(kept._file(f"{kind}.glb")) as file:
+                with whole_file(path) as file:
                     few_faces(mesh, MOST_FACES).export(file, file_type="glb")
         pair_CHW = np.concatenate([picture.left_BCHW[0].numpy(), picture.right_BCHW[0].numpy()], axis=2)
         pair_HWC = (pair_CHW.clip(0, 1) * 255).round().astype(np.uint8).transpose(1, 2, 0)
@@ -91,9 +93,11 @@ class ViewKeeper:
         )
 
     def write_index(self) -> None:
-        """Say what was kept, if anything was."""
+        """Say what was kept, if anything was; what a former evaluation kept here counts no more."""
         if self.entries:
             write_json(self.folder / INDEX, self.entries)
+        else:
+            (self.folder / INDEX).unlink(missing_ok=True)
 
 
 def read_kept_views(folder: Path) -> dict[tuple[str, str, int], KeptView]:

@@ -21,6 +21,7 @@ SAME_MODEL = (
     "logger.",
     "trainer.accelerator",
     "trainer.devices",
+    "trainer.nodes",
     "trainer.threads",
     "trainer.workers",
     "validation.checkpoint_interval",

@@ -196,9 +196,10 @@ class Reconstructor:
             photos = photo_of(left, "left"), photo_of(right, "right")
             pair = pair.fitted((photos[0].size, photos[1].size))
         on_object = isinstance(self.config.rig, RectifiedRigConfig)
-        given = center is not None and size is not None
         with _timed(seconds, "locate"):
-            found = locate_pair(pair, photos, boxes, masks, find, required=on_object and not given)
+            shown = any(part is not None for part in (*boxes, *masks, find, *(p.mask_HW for p in photos)))
+            required = on_object and (shown or center is None or size is None)
+            found = locate_pair(pair, photos, boxes, masks, find, required)
         with _timed(seconds, "frame"):
             framing = self._frame(pair, found, find, center, size)
             views = self._views(pair, photos, found, framing)

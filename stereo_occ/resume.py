@@ -91,6 +91,13 @@ class _Noting:
         self.file.flush()
 
 
+def _fixed(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What must not change, by its name; a schedule's warm-up follows the run's length, which may."""
+    scheduler = {key: value for key, value in config["scheduler"].items() if key != "warmup"}
+    rest = {"scheduler": scheduler, "validation.decision": config["validation"]["decision"]}
+    return {name: config[name] for name in FIXED} | rest
+
+
 def step_to_resume(checkpoint: Path, config: dict[str, Any], objects: Mapping[str, list[str]]) -> int:
     """The step that ``checkpoint`` was saved at, if it is of the run that is to go on.
 
@@ -106,7 +113,8 @@ def step_to_resume(checkpoint: Path, config: dict[str, Any], objects: Mapping[st
     except UserError as error:
         raise UserError(f"{error}; or copy best.ckpt over it, or say resume=never to start over") from error
     former = plain(config_of(saved, checkpoint))
-    changed = [name for name in FIXED if former[name] != config[name]]
+    before, now = _fixed(former), _fixed(config)
+    changed = [name for name in now if before[name] != now[name]]
     if changed:
         raise UserError(
             f"{checkpoint.parent}: holds a run with another {', '.join(changed)}; "

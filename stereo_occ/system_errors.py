@@ -44,7 +44,12 @@ def refusal(error: BaseException) -> str | None:
 
 def one_line(error: Exception) -> str:
     """What to say of a mistake of the user's or of what the system refuses; any other error is raised again."""
-    problem = str(error) if isinstance(error, UserError) else refusal(error)
+    problem = _text(error) if isinstance(error, UserError) else refusal(error)
     if problem is None:
         raise error
     return problem
+
+
+def _text(error: UserError) -> str:
+    """Its message, without the traceback that torch puts before it if it is of a loader's process."""
+    return str(error).rpartition(f"{UserError.__module__}.{UserError.__qualname__}: ")[2].strip()

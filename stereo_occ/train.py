@@ -80,6 +80,15 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
     return trainer
 
 
+def train_together(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None) -> None:
+    """:func:`train` in ``trainer.devices`` new processes of this machine."""
+    typed = OmegaConf.to_object(cfg)
+    assert isinstance(typed, TrainConfig)
+    # Rendered before they start: a group waits half an hour for its first process, no longer.
+    build_data(typed).prepare_data()
+    run_in_processes(typed.trainer.devices, train, cfg, folder, overrides)
+
+
 def build_data(typed: TrainConfig, objects: Objects | None = None) -> PairsDataModule:
     """The data of a training configuration, whose objects may be listed already."""
     data = PairsDataModule(
@@ -176,7 +185,7 @@ def main(cfg: DictConfig) -> float | None:
     folder = Path(HydraConfig.get().runtime.output_dir)
     arguments = cfg, folder, list(HydraConfig.get().overrides.task)
     if cfg.trainer.devices > 1 and not started_elsewhere():
-        run_in_processes(cfg.trainer.devices, train, *arguments)
+        train_together(*arguments)
     else:
         train(*arguments)
     return best_iou(folder / METRICS_FILE) if is_first() else None

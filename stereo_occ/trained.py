@@ -50,12 +50,21 @@ def load_trained(name: str) -> TrainedModel:
     Raises:
         UserError: there is no such file, or it is none of these.
     """
+    return trained_model(read_named(name), name)
+
+
+def read_named(name: str) -> dict[str, Any]:
+    """What :func:`load_trained` makes the model of; see :func:`~stereo_occ.checkpoint.read_checkpoint`.
+
+    Raises:
+        UserError: there is no such file, or it is no checkpoint.
+    """
     if not is_there(name):
         raise UserError(
             f"checkpoint={name}: no such file, nor the name of shipped weights "
             f"({', '.join(shipped()) or 'there are none'}); give the best.ckpt of a training run"
         )
-    return trained_model(read_checkpoint(Path(name)), name)
+    return read_checkpoint(Path(name))
 
 
 def trained_model(checkpoint: Mapping[str, Any], name: str) -> TrainedModel:

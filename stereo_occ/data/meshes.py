@@ -1,7 +1,6 @@
 """All meshes of a data set, read and repaired in processes of their own, so that none can stop the others."""
 
 import multiprocessing
-import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, as_completed
 from dataclasses import dataclass, replace
@@ -10,6 +9,7 @@ from pathlib import Path
 from pebble import ProcessExpired, ProcessPool
 from tqdm import tqdm
 
+from stereo_occ.cores import available_cores
 from stereo_occ.data.processes import limit_memory, start_worker
 from stereo_occ.errors import UserError
 from stereo_occ.shapes.inspection import Inspection
@@ -74,7 +74,7 @@ def inspect_files(
     missing = [path for path, entry in entries.items() if entry is None]
     failures: dict[Path, str] = {}
     if missing:
-        count = min(len(missing), workers or os.cpu_count() or 1)
+        count = min(len(missing), workers or available_cores())
         # Spawned: a process forked from one with threads or OpenGL may hang.
         context = multiprocessing.get_context("spawn")
         with (

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import multiprocessing
-import os
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -17,6 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from stereo_occ.config import PairsConfig
+from stereo_occ.cores import available_cores
 from stereo_occ.data.config import NOT_CONTENT, SliceConfig
 from stereo_occ.data.meshes import MeshRecord
 from stereo_occ.data.objects import Objects, ObjectSource, list_objects, members
@@ -74,7 +74,7 @@ def prepare(
         folder = prepared.folder
         remove_partial((*folder.glob(".*.part"), *folder.glob("*/.*.part")))
         _write_description(prepared.folder, pairs)
-        workers = min(len(missing), pairs.workers or len(os.sched_getaffinity(0)))
+        workers = min(len(missing), pairs.workers or available_cores())
         bar = tqdm(
             total=len(missing) * pairs.data.views,
             desc="rendering",

@@ -12,7 +12,7 @@ from stereo_occ.cli import compose_config
 from stereo_occ.errors import UserError
 from stereo_occ.group import run_in_processes
 from stereo_occ.quiet import quiet_libraries
-from stereo_occ.train import build_data, train
+from stereo_occ.train import build_data, train, train_together
 
 TWO = ["trainer=ddp", "logger=none"]
 
@@ -26,7 +26,7 @@ def run(workshop, folder, *overrides):
     if cfg.trainer.devices == 1:
         train(cfg, folder)
     else:
-        run_in_processes(cfg.trainer.devices, train, cfg, folder)
+        train_together(cfg, folder)
 
 
 @pytest.fixture(scope="module")

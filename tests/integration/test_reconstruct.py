@@ -191,12 +191,28 @@ def test_the_card_has_the_metrics_and_the_command(checkpoint, tmp_path):
     run = tmp_path / "run"
     run.mkdir()
     shutil.copy(checkpoint, run / "best.ckpt")
-    (run / "metrics.json").write_text(json.dumps({"metrics": {"test/iou": 0.5}}))
+    history = [
+        {"step": step, "val/iou": iou} for step, iou in ((6, 0.9), (7, 0.5))
+    ]  # the checkpoint is of step 7
+    (run / "metrics.json").write_text(json.dumps({"best": history[0], "history": history}))
     (run / "overrides.yaml").write_text("- model=stereo\n- steps=12\n")
     export(compose_config("export", [f"checkpoint='{run / 'best.ckpt'}'", f"output='{tmp_path / 'x'}'"]))
     card = (tmp_path / "x.md").read_text()
     assert "| `iou` | 0.5 |" in card
     assert "python -m stereo_occ.train model=stereo steps=12" in card
+
+
+def test_exporting_again_takes_the_metrics_that_came_with_the_weights(checkpoint, tmp_path, monkeypatch):
+    """Not those of a run in the working directory."""
+    (tmp_path / "evaluation.json").write_text(json.dumps({"metrics": {"test/iou": 0.7}}))
+    given = [f"checkpoint='{checkpoint}'", f"metrics='{tmp_path / 'evaluation.json'}'"]
+    export(compose_config("export", [*given, f"output='{tmp_path / 'x'}'"]))
+    (tmp_path / "metrics.json").write_text(json.dumps({"best": {"step": 7, "val/iou": 0.1}, "history": []}))
+    (tmp_path / "overrides.yaml").write_text("- model=stereo\n")
+    monkeypatch.chdir(tmp_path)
+    export(compose_config("export", ["checkpoint=x", "output=again"]))
+    assert json.loads(Path("again.json").read_text())["metrics"] == {"test/iou": 0.7}
+    assert "stereo_occ.train" not in Path("again.md").read_text()
 
 
 def test_weights_without_their_description(checkpoint, tmp_path):

@@ -11,8 +11,9 @@ from lightning.pytorch.utilities.exceptions import SIGTERMException
 from runs import Workshop, program
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from stereo_occ import resume
 from stereo_occ import train as train_module
-from stereo_occ.checkpoint import KEY, read_checkpoint
+from stereo_occ.checkpoint import KEY, plain, read_checkpoint
 from stereo_occ.cli import compose_config
 from stereo_occ.errors import UserError
 
@@ -326,6 +327,23 @@ def test_another_run_in_the_same_folder_is_refused(workshop, run):
     with pytest.raises(UserError, match=r"holds a run with another model, seed.*resume=never"):
         workshop.train(run, "seed=1", "model.width=4")
     assert (run / "last.ckpt").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("override", "name"),
+    [("scheduler=cosine", "scheduler"), ("validation.decision=relative", r"validation\.decision")],
+)
+def test_a_run_does_not_go_on_with_another_schedule_or_rule(workshop, run, override, name):
+    with pytest.raises(UserError, match=rf"holds a run with another {name};"):
+        workshop.train(run, override)
+
+
+def test_a_longer_run_is_the_same_run():
+    """Its warm-up is longer too."""
+    config = plain(compose_config("train", ["scheduler=cosine", "steps=4000"]))
+    longer = plain(compose_config("train", ["scheduler=cosine", "steps=8000"]))
+    assert config["scheduler"]["warmup"] != longer["scheduler"]["warmup"]
+    assert resume._fixed(config) == resume._fixed(longer)
 
 
 @pytest.mark.parametrize(

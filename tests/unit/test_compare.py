@@ -149,6 +149,7 @@ def test_all_folders_of_both_sides_are_checked(tmp_path, capsys):
     ("of_second", "difference"),
     [
         ({"trained": {"config": {"seed": 1, "model": {"name": "stereo"}}}}, None),
+        ({"trained": {"config": {"seed": 1, "model": {"name": "stereo"}, "trainer": {"nodes": 2}}}}, None),
         ({"trained": {"config": {"seed": 0, "model": {"name": "mono"}}}}, "model.name (stereo and mono)"),
         ({"control": {"name": "left_twice", "degrees": 0.0}}, "control.name (none and left_twice)"),
     ],

@@ -111,7 +111,11 @@ def test_shift_beyond_the_image_leaves_nothing():
 
 @pytest.mark.parametrize(
     "volume",
-    [Correlation(8, disparities=SIGNED), Groupwise(8, disparities=SIGNED, groups=2), PlaneSweep(8, planes=16)],
+    [
+        Correlation(8, disparities=SIGNED),
+        Groupwise(8, disparities=SIGNED, groups=2),
+        PlaneSweep(8, planes=16),
+    ],
     ids=lambda volume: type(volume).__name__,
 )
 def test_autocast_costs_volumes_no_digit(volume):

@@ -245,6 +245,17 @@ def test_where_the_object_is_may_be_said_in_metres():
     np.testing.assert_allclose(result.left_from_cube[:3, 3], CENTER, atol=1e-9)
 
 
+def test_a_mask_counts_beside_centre_and_size():
+    """They replace what is measured from it, no more."""
+    pair = PAIRS["turned"]
+    images = [photograph(camera) for camera in pair.cameras]
+    masks = tuple(image.min(axis=2) < 128 for image in images)
+    result = on_object()(*images, pair, masks=masks, center=CENTER.tolist(), size=0.16, surface=COARSE)
+    assert result.found is not None
+    np.testing.assert_array_equal(result.found[0].mask_HW, masks[0])
+    np.testing.assert_allclose(result.left_from_cube[:3, 3], CENTER, atol=1e-9)
+
+
 def test_the_rig_frame_stands_upright_at_the_cube():
     pair = PAIRS["parallel"]
     result = on_object()(*map(photograph, pair.cameras), pair, surface=COARSE)

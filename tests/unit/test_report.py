@@ -17,7 +17,7 @@ from samples import single_line
 from stereo_occ.cli import compose_config
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import toed_in_rig
-from stereo_occ.kept_views import read_kept_views
+from stereo_occ.kept_views import ViewKeeper, read_kept_views
 from stereo_occ.mesh_output import few_faces
 from stereo_occ.metrics.curves import LEVELS
 from stereo_occ.report import figures
@@ -307,6 +307,13 @@ def test_kept_views_read_back(views):
     assert np.allclose(view.rig.left.K, expected.K, atol=1e-4)
     with Image.open(view.pair_file) as pair:
         assert pair.size == (32, 16)
+
+
+def test_an_evaluation_that_keeps_nothing_leaves_no_former_views(tmp_path):
+    write_views(tmp_path)
+    assert read_kept_views(tmp_path)
+    ViewKeeper(tmp_path).write_index()
+    assert read_kept_views(tmp_path) == {}
 
 
 def test_a_row_looks_from_the_left_camera(views, tmp_path):

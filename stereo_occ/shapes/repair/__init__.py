@@ -62,9 +62,7 @@ def repair(mesh: Trimesh) -> Repair:
         raise UserError("has no triangle with three different corners")
     to_unit = _Frame(welded)
     unit = source = to_unit(welded)
-    if not (
-        _is_sound(unit) and unit.body_count == 1 and overlap(unit, RayMeshIntersector(unit)) <= MAX_OVERLAP
-    ):
+    if not (unit.body_count == 1 and _is_sound(unit)):
         unit, source, more = _solid(unit)
         if more:
             steps += more
@@ -86,11 +84,7 @@ def _solid(unit: Trimesh) -> tuple[Trimesh, Trimesh, list[str]]:
     if tolerance:
         steps.append(f"welded vertices {tolerance:g} of the diagonal apart")
     assembly, done = assemble(unit)
-    if (
-        assembly is not None
-        and _is_sound(assembly.solid)
-        and overlap(assembly.solid, RayMeshIntersector(assembly.solid)) <= MAX_OVERLAP
-    ):
+    if assembly is not None and _is_sound(assembly.solid):
         return (assembly.solid if done else unit), assembly.source, steps + done
     solid, sheet = wrap(unit)
     steps.append("wrapped")
