@@ -219,7 +219,7 @@ def _by_view(path: Path) -> dict[tuple[str, str, str], dict[str, str]]:
 
 
 def _rounded(value: Difference) -> list[float | None]:
-    return [None if x is None else round(x, 4) for x in (value.difference, value.low, value.high)]
+    return [None if x is None else round(x, 6) for x in (value.difference, value.low, value.high)]
 
 
 def fill(page: Path, name: str, text: str) -> None:

@@ -88,13 +88,6 @@ class PairsConfig:
 
 
 @dataclass
-class ModelConfig:
-    """Any model; see ``stereo_occ.models.config`` for each."""
-
-    name: str = MISSING
-
-
-@dataclass
 class QueriesConfig:
     """Where the query points of a training step lie, as shares that add up to 1."""
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from trimesh import Trimesh
 
-from stereo_occ.geometry.camera import Camera, StereoRig
+from stereo_occ.geometry.camera import StereoRig
 from stereo_occ.render.appearance import Appearance
 from stereo_occ.render.stereo import StereoRenderer
 
@@ -43,15 +43,7 @@ def picture(mesh: Trimesh, rig: StereoRig, look: Appearance = LOOK) -> NDArray[n
 
 def resized(rig: StereoRig, side: int) -> StereoRig:
     """The same cameras with images of ``side`` by ``side`` pixels."""
-    return StereoRig(*(_resized(camera, side) for camera in rig.cameras))
-
-
-def _resized(camera: Camera, side: int) -> Camera:
-    K = camera.K.copy()
-    for axis, size in enumerate((camera.width, camera.height)):
-        K[axis] *= side / size
-        K[axis, 2] += (side / size - 1) / 2  # the image spans -0.5 .. size - 0.5 before and after
-    return Camera(K, camera.camera_from_rig, side, side)
+    return StereoRig(*(camera.resized(side, side) for camera in rig.cameras))
 
 
 def enlarge(image_CHW: Tensor) -> NDArray[np.uint8]:

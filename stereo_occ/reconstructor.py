@@ -31,7 +31,7 @@ from stereo_occ.photographs.match import SIDES
 from stereo_occ.photographs.outline import preview
 from stereo_occ.photographs.photo import Photo, seen_by
 from stereo_occ.reconstruction import expected_iou, sample_cube, threshold_of
-from stereo_occ.trained import Predictor, load_trained
+from stereo_occ.trained import Predict, load_trained
 
 logger = logging.getLogger(__name__)
 
@@ -134,7 +134,7 @@ class Reconstructor:
         name: of the checkpoint.
     """
 
-    def __init__(self, config: TrainConfig, predict: Predictor, decision: Decision, name: str) -> None:
+    def __init__(self, config: TrainConfig, predict: Predict, decision: Decision, name: str) -> None:
         self.config, self.predict, self.decision, self.name = config, predict, decision, name
 
     @classmethod

@@ -19,7 +19,7 @@ from stereo_occ.packaged import is_there, shipped
 from stereo_occ.reconstruction import Occupancy, occupancy_of
 
 #: What a stereo pair (``B = 1``) makes of a model.
-Predictor = Callable[[StereoViews], Occupancy]
+Predict = Callable[[StereoViews], Occupancy]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class TrainedModel:
     name: str
 
     def predict(self, views: StereoViews) -> Occupancy:
-        """See :data:`Predictor`."""
+        """See :data:`Predict`."""
         return occupancy_of(self.model, views)
 
 

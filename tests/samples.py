@@ -13,6 +13,9 @@ from stereo_occ.geometry.rotations import random_rotations
 from stereo_occ.occupancy.pools import box_pool, surface_pool
 from stereo_occ.shapes.shape import Shape
 
+#: Objects per category in the paper's data set (section 4).
+PAPER_COUNTS = {"mug": 114, "bowl": 174, "bottle": 352}
+
 SIDE = 16  # pixels
 
 POOL = 2000  # points

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stereo_occ.calibration.lens import Lens
 from stereo_occ.errors import UserError
-from stereo_occ.geometry.camera import Camera, StereoRig, check_rigid
+from stereo_occ.geometry.camera import Camera, StereoRig, check_rigid, resized_intrinsics
 
 #: Baselines that a pair of cameras for household objects may have, metres.
 BASELINES = (0.005, 3.0)
@@ -99,9 +99,7 @@ class RealCamera:
                 f"rig: the {name} camera was calibrated with {self.size[0]} x {self.size[1]} pixels, its image has "
                 f"{width} x {height}, which is not the same shape; calibrate at the size of the image, or scale it back"
             )
-        K = self.K.copy()
-        K[:2] *= scale_2[:, None]
-        K[:2, 2] += (scale_2 - 1) / 2  # the image spans -0.5 .. size - 0.5 before and after
+        K = resized_intrinsics(self.K, self.size, (width, height))
         return replace(self, K=K, size=(width, height))
 
 

@@ -9,9 +9,9 @@ path                                    shape, type         meaning
 ``mesh/vertices``, ``mesh/faces``       (V, 3) f4, (F, 3)   object frame
 ``views/rgb``                           (N, 2, H, W, 3) u1  left, right
 ``views/mask``                          (N, 2, H, W) u1     coverage, 255 is the object
-``views/depth``                         (N, 2, H, W) f2     metres along the optical axis, 0 is background
+``views/depth``                         (N, 2, H, W) f2     units of the rig frame along the optical axis; 0: none
 ``views/K``                             (N, 2, 3, 3) f8     intrinsics, pixels
-``views/camera_from_rig``               (N, 2, 4, 4) f8     extrinsics, metres
+``views/camera_from_rig``               (N, 2, 4, 4) f8     extrinsics, units of the rig frame
 ``views/rig_from_object``               (N, 4, 4) f8        pose: scale, rotation, translation
 ``views/unit``                          (N,) f8             metres per unit of the rig frame; absent: 1
 ``points/<pool>/grid``                  (P, 3) u2           see :class:`~stereo_occ.occupancy.pools.PointPool`
@@ -180,7 +180,7 @@ class Shard:
         return self._read("views/mask", view)
 
     def depth(self, view: int) -> NDArray[np.float16]:
-        """Left and right depth ``(2, H, W)`` in metres; 0 is background."""
+        """Left and right depth ``(2, H, W)`` in units of the rig frame; 0 is background."""
         return self._read("views/depth", view)
 
     def cameras(self, view: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -47,6 +47,17 @@ def normalize_pixels(pixels_N2: Tensor, width: int, height: int) -> Tensor:
     return (2 * pixels_N2 + 1) / pixels_N2.new_tensor([width, height]) - 1
 
 
+def resized_intrinsics(
+    K_33: NDArray[np.float64], size: tuple[int, int], target: tuple[int, int]
+) -> NDArray[np.float64]:
+    """``K`` of an image of that width and height when it is resampled to another: it spans -0.5 .. size - 0.5."""
+    scale_2 = np.array(target) / size
+    K_33 = K_33.copy()
+    K_33[:2] *= scale_2[:, None]
+    K_33[:2, 2] += (scale_2 - 1) / 2
+    return K_33
+
+
 @dataclass(frozen=True, eq=False)
 class Camera:
     """A pinhole camera: intrinsics ``K`` (3x3, pixels), ``camera_from_rig`` (4x4, metres), image size in pixels."""
@@ -60,6 +71,15 @@ class Camera:
         check_rigid(self.camera_from_rig, "camera_from_rig")
         if not (self.K[0, 0] > 0 and self.K[1, 1] > 0 and np.isfinite(self.K).all()):
             raise UserError(f"K: focal lengths must be positive and finite, got {self.K.tolist()}")
+
+    def resized(self, width: int, height: int) -> "Camera":
+        """The camera of the same image at another size."""
+        return Camera(
+            resized_intrinsics(self.K, (self.width, self.height), (width, height)),
+            self.camera_from_rig,
+            width,
+            height,
+        )
 
     def project(self, points_N3: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rig-frame points ``(N, 3)`` to pixels ``(N, 2)`` and depths ``(N,)``; see :func:`project`."""

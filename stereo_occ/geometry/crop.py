@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import Camera
@@ -73,17 +72,3 @@ class Crop:
     def camera(self, camera: Camera) -> Camera:
         """The camera whose whole image is this crop of ``camera``'s."""
         return Camera(self.intrinsics(camera.K), camera.camera_from_rig, self.side, self.side)
-
-    def resample(self, image_HW3: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """The crop's pixels ``(side, side, 3)`` of a picture, area-averaged; beyond its edges their own colours."""
-        H, W = image_HW3.shape[:2]
-        reach = np.array(
-            [self.left, self.top, W - 1 - self.left - self.extent, H - 1 - self.top - self.extent]
-        )
-        left, top, right, bottom = np.maximum(0, np.ceil(-reach - 0.5) + 1).astype(int)
-        padded = np.pad(image_HW3, ((top, bottom), (left, right), (0, 0)), mode="edge")
-        # Pillow counts from the outer edge of the image.
-        x, y = self.left + 0.5 + left, self.top + 0.5 + top
-        box = (x, y, x + self.extent, y + self.extent)
-        resized = Image.fromarray(padded).resize((self.side, self.side), Image.Resampling.BOX, box)
-        return np.asarray(resized)

@@ -10,13 +10,6 @@ import torch
 from torch import Tensor
 
 
-def iou(predicted_BN: Tensor, occupied_BN: Tensor) -> Tensor:
-    """IoU ``(B,)`` of boolean predictions ``(B, N)`` with boolean labels ``(B, N)``."""
-    intersection_B = (predicted_BN & occupied_BN).sum(dim=1)
-    union_B = (predicted_BN | occupied_BN).sum(dim=1)
-    return _ratio(intersection_B, union_B, union_B == 0)
-
-
 def iou_at_thresholds(logits_BN: Tensor, occupied_BN: Tensor, thresholds_T: Tensor) -> Tensor:
     """IoU ``(B, T)`` where a point is predicted occupied if its probability is at least the threshold.
 
@@ -31,15 +24,6 @@ def iou_at_thresholds(logits_BN: Tensor, occupied_BN: Tensor, thresholds_T: Tens
     true_BT, false_BT, positives_B1 = _count(logits_BN, occupied_BN, thresholds_T)
     union_BT = positives_B1 + false_BT
     return _failed_is_zero(_ratio(true_BT, union_BT, union_BT == 0), logits_BN)
-
-
-def precision_recall(logits_BN: Tensor, occupied_BN: Tensor, thresholds_T: Tensor) -> tuple[Tensor, Tensor]:
-    """Precision and recall, each ``(B, T)``; arguments and errors as in :func:`iou_at_thresholds`."""
-    true_BT, false_BT, positives_B1 = _count(logits_BN, occupied_BN, thresholds_T)
-    both_empty_BT = positives_B1 + false_BT == 0
-    precision_BT = _ratio(true_BT, true_BT + false_BT, both_empty_BT)
-    recall_BT = _ratio(true_BT, positives_B1.expand_as(true_BT), both_empty_BT)
-    return _failed_is_zero(precision_BT, logits_BN), _failed_is_zero(recall_BT, logits_BN)
 
 
 def category_means(values_V: Tensor, categories: Sequence[str]) -> dict[str, float]:

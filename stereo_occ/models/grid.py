@@ -33,7 +33,7 @@ class Grid:
         return Grid(self.center_B3.detach(), self.side_B.detach())
 
 
-def working_cube(batch: int, device: torch.device) -> Grid:
+def whole_cube(batch: int, device: torch.device) -> Grid:
     """The cube ``[-0.5, 0.5]^3`` for every sample."""
     return Grid(torch.zeros(batch, 3, device=device), torch.ones(batch, device=device))
 

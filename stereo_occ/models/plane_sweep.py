@@ -10,7 +10,7 @@ from stereo_occ.errors import UserError
 from stereo_occ.models.base import StereoViews
 from stereo_occ.models.encoders import ImageEncoder
 from stereo_occ.models.evidence import PairEvidence
-from stereo_occ.models.grid import Grid, Locator, locator_loss, working_cube
+from stereo_occ.models.grid import Grid, Locator, locator_loss, whole_cube
 from stereo_occ.models.pixel_stereo import CalibratedMaps, PixelStereoCode, PixelStereoModel
 from stereo_occ.models.sampling import Projections, cell_centers, sample_volume
 from stereo_occ.models.seen_surface import SeenSurface
@@ -119,7 +119,7 @@ class PlaneSweepStereoModel(PixelStereoModel):
     def encode(self, views: StereoViews) -> PlaneSweepCode:
         """Maps of the views, their common code and the completed volume."""
         pair = super().encode(views)
-        grid = working_cube(len(views.left_BCHW), views.left_BCHW.device)
+        grid = whole_cube(len(views.left_BCHW), views.left_BCHW.device)
         if self.scout is not None and self.locator is not None:
             grid = self.locator(self.scout(pair.maps, grid))
         volume_BCDHW = self.unet(self.sweep(pair.maps, grid.detach()))

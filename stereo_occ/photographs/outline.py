@@ -1,7 +1,6 @@
 """The outline of a surface over the photographs that it was made from."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +42,7 @@ def preview(
         top = outlined(np.asarray(whole), pixels_V2, mesh, camera.center_3)
         if boxes is not None:
             top = _boxed(top, boxes[index], scale)
-        large = _enlarged(view)
+        large = view.resized(PANEL, PANEL)
         below = np.rint(seen_by(image_HW3, camera, large)).astype(np.uint8)
         pixels_V2 = large.project(np.asarray(mesh.vertices))[0]
         columns.append((top, outlined(below, pixels_V2, mesh, camera.center_3)))
@@ -93,11 +92,3 @@ def _boxed(image_HW3: NDArray[np.uint8], box: Box, scale: float) -> NDArray[np.u
     edges = (np.array([box.left, box.top, box.right, box.bottom]) + 0.5) * scale - 0.5
     ImageDraw.Draw(image).rectangle(edges.tolist(), outline=BOX_COLOR)
     return np.asarray(image)
-
-
-def _enlarged(camera: Camera) -> Camera:
-    scale = PANEL / camera.width
-    K = camera.K.copy()
-    K[:2] *= scale
-    K[:2, 2] += (scale - 1) / 2
-    return replace(camera, K=K, width=PANEL, height=PANEL)

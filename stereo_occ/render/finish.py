@@ -5,6 +5,7 @@ from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
+from trimesh.visual.color import srgb_to_linear
 
 
 class Pattern(IntEnum):
@@ -61,6 +62,4 @@ class Finish:
 
 def root_of_linear(srgb_V3: NDArray[np.number]) -> NDArray[np.float64]:
     """Own colours of a mesh as its vertices carry them: square roots of linear reflectances, from sRGB 0 to 255."""
-    srgb_V3 = srgb_V3 / 255
-    linear_V3 = np.where(srgb_V3 <= 0.04045, srgb_V3 / 12.92, ((srgb_V3 + 0.055) / 1.055) ** 2.4)
-    return np.sqrt(linear_V3)
+    return np.asarray(np.sqrt(srgb_to_linear(srgb_V3 / 255)))

@@ -157,9 +157,10 @@ class StereoRenderer:
         finishes = [finish, *([] if clutter is None else clutter.finishes)]
         self._surfaces.set_look(finishes, np.zeros((0, 4)) if clutter is None else clutter.contacts_C4, light)
         self._surfaces.cast_shadows(rig_from_object, light)
+        factor = self._supersampling
         return [
             self._surfaces.samples(
-                self._supersampled(camera),
+                camera.resized(factor * camera.width, factor * camera.height),
                 rig_from_object,
                 finish.texture_from_object,
                 self._material.doubleSided,
@@ -174,12 +175,6 @@ class StereoRenderer:
         open_V = openness(mesh, positions_V3, normals_V3) if shadowed else np.ones(len(positions_V3))
         self._surfaces.load_object(object_vertices(positions_V3, normals_V3, own_V3, open_V), faces_F3)
         self._surfaces_open = shadowed
-
-    def _supersampled(self, camera: Camera) -> Camera:
-        factor = self._supersampling
-        K = camera.K * np.array([factor, factor, 1])[:, None]
-        K[:2, 2] += (factor - 1) / 2
-        return Camera(K, camera.camera_from_rig, factor * camera.width, factor * camera.height)
 
     def _samples(self, camera: Camera) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Premultiplied colour and coverage ``(H, W, 4)`` and depth ``(H, W)`` of the samples of all pixels."""

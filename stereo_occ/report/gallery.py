@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from trimesh import Trimesh
 from trimesh.graph import smooth_shade
+from trimesh.visual.color import srgb_to_linear
 from trimesh.visual.material import PBRMaterial
 from trimesh.visual.texture import TextureVisuals
 
@@ -52,7 +53,7 @@ class Panel:
     def glb(self) -> str:
         """The mesh as a GLB file in base64."""
         shaded = smooth_shade(self.mesh, angle=_CREASE)
-        shade = [round(255 * channel) for channel in _linear(self.color)]
+        shade = np.rint(255 * srgb_to_linear(to_rgb(self.color))).astype(int).tolist()
         material = PBRMaterial(baseColorFactor=[*shade, 255], metallicFactor=0.0, roughnessFactor=0.75)
         shaded.visual = TextureVisuals(material=material)
         return base64.b64encode(shaded.export(file_type="glb", include_normals=True)).decode()
@@ -84,7 +85,7 @@ class GalleryRow:
         """
         camera = Camera(intrinsics(radians(self.fov), PANEL), self._camera_from_rig, PANEL, PANEL)
         rig = StereoRig(camera, camera)
-        looks = [replace(LOOK, base_color_3=np.array(_linear(panel.color))) for panel in self.panels]
+        looks = [replace(LOOK, base_color_3=srgb_to_linear(to_rgb(panel.color))) for panel in self.panels]
         return [
             Image.fromarray(picture(panel.mesh, rig, look))
             for panel, look in zip(self.panels, looks, strict=True)
@@ -134,11 +135,6 @@ def make_row(choice: Choice, kept: Sequence[KeptView], models: Sequence[tuple[Mo
     fov = 2 * degrees(asin(min(0.9, 1.05 * reach / distance)))
     orbit = (degrees(atan2(x, z)), degrees(acos(y / distance)), distance)
     return GalleryRow(choice, pictures, panels, target, orbit, fov)
-
-
-def _linear(color: str) -> list[float]:
-    """Of an sRGB colour, as glTF wants it."""
-    return [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(color)]
 
 
 def title_of(key: Key) -> str:

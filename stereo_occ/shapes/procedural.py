@@ -11,9 +11,6 @@ from stereo_occ.shapes.bowl import bowl
 from stereo_occ.shapes.mug import mug
 from stereo_occ.shapes.shape import CATEGORIES, Shape
 
-#: Objects per category in the paper's data set (section 4).
-PAPER_COUNTS = {"mug": 114, "bowl": 174, "bottle": 352}
-
 _MAKERS: dict[str, Callable[[Generator, str], Shape]] = {"mug": mug, "bowl": bowl, "bottle": bottle}
 
 

@@ -8,6 +8,7 @@ import torch
 import yaml
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
+from samples import PAPER_COUNTS
 
 from stereo_occ.checkpoint import plain
 from stereo_occ.checks import check_evaluation, check_pairs, check_rendering, check_training
@@ -16,7 +17,6 @@ from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
 from stereo_occ.paths import conf_dir
 from stereo_occ.problems import find_problems
-from stereo_occ.shapes.procedural import PAPER_COUNTS
 
 PROGRAMS = ("train", "render", "evaluate")
 FILES = sorted(path.relative_to(conf_dir()).with_suffix("") for path in conf_dir().rglob("*.yaml"))

@@ -7,7 +7,7 @@ import pytest
 
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import Camera, StereoRig, toed_in_rig, transform_points
-from stereo_occ.geometry.crop import Box, Crop
+from stereo_occ.geometry.crop import Box
 from stereo_occ.geometry.cube import FILL, cube_at, ray, triangulate, working_cube
 from stereo_occ.geometry.rotations import random_rotations
 
@@ -161,21 +161,3 @@ def test_a_mask_has_the_box_of_its_whole_pixels():
     assert Box.of_mask(mask) == Box(2.5, 1.5, 8.5, 4.5)
     with pytest.raises(UserError, match="empty"):
         Box.of_mask(np.zeros((3, 3), bool))
-
-
-def test_resampling_follows_the_intrinsics():
-    """A linear ramp of colour in the image is the ramp that the crop's pixels look at."""
-    image = np.repeat(np.arange(200, dtype=np.uint8)[None, :, None], 100, axis=0).repeat(3, axis=2)
-    crop = Crop(left=39.5, top=19.5, extent=64, side=16)
-    K = crop.intrinsics(np.eye(3))
-    columns = (np.arange(16) - K[0, 2]) / K[0, 0]
-    np.testing.assert_allclose(crop.resample(image)[3, :, 0], columns, atol=0.51)
-
-
-def test_crops_beyond_the_image_repeat_its_edge():
-    image = np.full((20, 30, 3), 90, np.uint8)
-    image[:, 0] = 200
-    crop = Crop(left=-12.5, top=-6.5, extent=40, side=40)
-    pixels = crop.resample(image)
-    assert (pixels[:, :13] == 200).all()
-    assert (pixels[:, 13:] == 90).all()

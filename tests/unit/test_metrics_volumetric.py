@@ -5,9 +5,7 @@ import torch
 from stereo_occ.metrics.volumetric import (
     best_threshold,
     category_means,
-    iou,
     iou_at_thresholds,
-    precision_recall,
 )
 
 THRESHOLDS = torch.arange(1, 20) / 20
@@ -16,6 +14,12 @@ INF = float("inf")
 
 def ball(points_N3, radius, center=(0.0, 0, 0)):
     return torch.tensor(np.linalg.norm(points_N3 - np.array(center), axis=1) < radius)[None]
+
+
+def iou(predicted_BN, occupied_BN):
+    """Of yes or no, through logits."""
+    logits_BN = torch.where(predicted_BN, 9.0, -9.0)
+    return iou_at_thresholds(logits_BN, occupied_BN, torch.tensor([0.5]))[:, 0]
 
 
 def cube_points(count=200_000):
@@ -57,13 +61,10 @@ def test_many_thresholds_agree_with_one_at_a_time():
     logits_BN = 3 * torch.randn(5, 400, generator=generator)
     occupied_BN = torch.rand(5, 400, generator=generator) < logits_BN.sigmoid()
     table_BT = iou_at_thresholds(logits_BN, occupied_BN, THRESHOLDS)
-    precision_BT, recall_BT = precision_recall(logits_BN, occupied_BN, THRESHOLDS)
     for column, threshold in enumerate(THRESHOLDS):
         predicted_BN = logits_BN.double().sigmoid() >= threshold.double()
-        torch.testing.assert_close(table_BT[:, column], iou(predicted_BN, occupied_BN))
-        hits_B = (predicted_BN & occupied_BN).sum(1)
-        torch.testing.assert_close(precision_BT[:, column], hits_B / predicted_BN.sum(1))
-        torch.testing.assert_close(recall_BT[:, column], hits_B / occupied_BN.sum(1))
+        intersection_B, union_B = (predicted_BN & occupied_BN).sum(1), (predicted_BN | occupied_BN).sum(1)
+        torch.testing.assert_close(table_BT[:, column], intersection_B / union_B)
 
 
 def test_a_probability_at_the_threshold_counts_as_occupied():
@@ -91,24 +92,9 @@ def test_low_precision_logits(dtype):
 def test_a_nan_fails_its_own_view_only():
     logits_BN = torch.tensor([[float("nan"), -9, -9], [9, -9, -9]])
     occupied_BN = torch.tensor([[False, False, False], [True, False, False]])
-    for score_BT in (
-        iou_at_thresholds(logits_BN, occupied_BN, THRESHOLDS),
-        *precision_recall(logits_BN, occupied_BN, THRESHOLDS),
-    ):
-        assert (score_BT[0] == 0).all()
-        assert (score_BT[1] == 1).all()
-
-
-def test_precision_and_recall_without_predictions_or_objects():
-    silent, loud = torch.full((1, 2), -9.0), torch.full((1, 2), 9.0)
-    half, empty, full = torch.tensor([0.5]), torch.zeros(1, 2).bool(), torch.ones(1, 2).bool()
-    for logits_BN, occupied_BN, expected in (
-        (silent, empty, (1, 1)),
-        (silent, full, (0, 0)),
-        (loud, empty, (0, 0)),
-        (loud, full, (1, 1)),
-    ):
-        assert tuple(score.item() for score in precision_recall(logits_BN, occupied_BN, half)) == expected
+    score_BT = iou_at_thresholds(logits_BN, occupied_BN, THRESHOLDS)
+    assert (score_BT[0] == 0).all()
+    assert (score_BT[1] == 1).all()
 
 
 @pytest.mark.parametrize("thresholds", [[0.5, 0.4], [0.0, 0.5], [0.5, 1.0], [0.5, 0.5]])

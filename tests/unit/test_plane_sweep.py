@@ -7,7 +7,7 @@ from rigs import HEIGHT, WIDTH, cameras_VB, random_pairs, random_rig
 
 from stereo_occ.errors import UserError
 from stereo_occ.models.evidence import PairEvidence, groupwise_correlation, positional_encoding
-from stereo_occ.models.grid import Grid, working_cube
+from stereo_occ.models.grid import Grid, whole_cube
 from stereo_occ.models.light import LightEncoder
 from stereo_occ.models.pixel_stereo import CalibratedMaps
 from stereo_occ.models.plane_sweep import PlaneSweepStereoModel, SweptVolume
@@ -122,7 +122,7 @@ def test_a_point_that_one_view_sees_has_that_views_evidence_and_no_comparison():
 @pytest.mark.parametrize("around", ["cube", "object"])
 def test_the_volume_at_a_cells_centre_is_the_evidence_of_that_point(around):
     maps, sweep = pair_maps(), SweptVolume(8, 2, cells=6, width=6)
-    grid = working_cube(3, torch.device("cpu"))
+    grid = whole_cube(3, torch.device("cpu"))
     if around == "object":
         grid = Grid(torch.tensor([[0.1, -0.2, 0], [0, 0.1, 0.2], [0, 0, 0]]), torch.tensor([0.5, 0.4, 1]))
     centers = sweep.centers_N3.expand(3, -1, -1)

@@ -6,10 +6,11 @@ import sys
 
 import numpy as np
 import pytest
+from samples import PAPER_COUNTS
 
 from stereo_occ.errors import UserError
 from stereo_occ.shapes import bottle, bowl, mug
-from stereo_occ.shapes.procedural import PAPER_COUNTS, procedural_shape
+from stereo_occ.shapes.procedural import procedural_shape
 
 SEED = 0
 KINDS = {"mug": mug.BODIES, "bowl": tuple(bowl.KIND_ODDS), "bottle": tuple(bottle.KIND_ODDS)}

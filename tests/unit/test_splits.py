@@ -2,10 +2,10 @@ from collections import Counter
 from itertools import chain
 
 import pytest
+from samples import PAPER_COUNTS
 
 from stereo_occ.data.splits import SUBSETS, split_objects, split_views, subset_sizes
 from stereo_occ.errors import UserError
-from stereo_occ.shapes.procedural import PAPER_COUNTS
 
 FRACTIONS = (0.8, 0.1, 0.1)
 
