@@ -2,7 +2,7 @@
 
 import torch
 
-from stereo_occ.models.grid import MARGIN, Grid, Locator, locator_loss, working_cube
+from stereo_occ.models.grid import MARGIN, Grid, Locator, locator_loss, whole_cube
 from stereo_occ.models.sampling import cell_centers
 
 GRID = Grid(torch.tensor([[0.1, -0.2, 0.3], [0.0, 0.1, 0.0]]), torch.tensor([0.5, 0.25]))
@@ -22,7 +22,7 @@ def test_a_grids_own_coordinates_run_from_minus_a_half_to_a_half():
 
 def test_in_the_working_cube_the_coordinates_are_those_of_the_rig():
     points = torch.rand(3, 7, 3) - 0.5
-    torch.testing.assert_close(working_cube(3, points.device).to_local(points), points)
+    torch.testing.assert_close(whole_cube(3, points.device).to_local(points), points)
 
 
 def test_the_loss_is_zero_for_the_cube_around_the_occupied_points_alone():
