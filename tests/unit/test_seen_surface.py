@@ -5,7 +5,7 @@ import pytest
 import torch
 from rigs import HEIGHT, WIDTH, cameras_VB, random_rig
 
-from stereo_occ.models.grid import Grid, working_cube
+from stereo_occ.models.grid import Grid, whole_cube
 from stereo_occ.models.pixel_stereo import CalibratedMaps
 from stereo_occ.models.sampling import cell_centers
 from stereo_occ.models.seen_surface import NEAR, REACH, SCALES, SeenSurface, lines_of_sight
@@ -66,7 +66,7 @@ def test_lines_of_sight_go_through_their_cells_at_the_depths_asked_for(rigs):
     "grid", [None, Grid(torch.tensor([[0.1, 0.0, -0.05]]).expand(3, 3), torch.full((3,), 0.8))]
 )
 def test_a_plane_in_the_volume_is_found_along_every_line_of_sight_that_meets_it(rigs, grid):
-    grid = grid or working_cube(3, torch.device("cpu"))
+    grid = grid or whole_cube(3, torch.device("cpu"))
     normal, offset = torch.tensor([0.1, 0.2, 0.97]), 0.07
     centers_BN3 = grid.to_rig(cell_centers(CELLS))
     distances = (centers_BN3 @ normal - offset).view(3, 1, CELLS, CELLS, CELLS)
