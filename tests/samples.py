@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import torch
 import trimesh
 
 from stereo_occ.data.shard import Views
@@ -10,6 +11,7 @@ from stereo_occ.data.shard_writing import write_shard
 from stereo_occ.geometry.camera import toed_in_rig
 from stereo_occ.geometry.pose import Pose
 from stereo_occ.geometry.rotations import random_rotations
+from stereo_occ.metrics.volumetric import iou_at_thresholds
 from stereo_occ.occupancy.pools import box_pool, surface_pool
 from stereo_occ.shapes.shape import Shape
 
@@ -30,6 +32,12 @@ TINY = [
     "model.decoder.hidden=16", "model.decoder.blocks=1", "optimizer.lr=0.01",
     "logger.interval=1", "logger.mesh_resolution=8",
 ]  # fmt: skip
+
+
+def iou(predicted_BN: torch.Tensor, occupied_BN: torch.Tensor) -> torch.Tensor:
+    """IoU ``(B,)`` of yes or no ``(B, N)``, by the package's rule for logits."""
+    logits_BN = torch.where(predicted_BN, 9.0, -9.0)
+    return iou_at_thresholds(logits_BN, occupied_BN, torch.tensor([0.5]))[:, 0]
 
 
 def solid(category: str, object_id: str) -> Shape:

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 import torch
+from samples import iou
 
 from stereo_occ.metrics.volumetric import (
     best_threshold,
@@ -14,12 +15,6 @@ INF = float("inf")
 
 def ball(points_N3, radius, center=(0.0, 0, 0)):
     return torch.tensor(np.linalg.norm(points_N3 - np.array(center), axis=1) < radius)[None]
-
-
-def iou(predicted_BN, occupied_BN):
-    """Of yes or no, through logits."""
-    logits_BN = torch.where(predicted_BN, 9.0, -9.0)
-    return iou_at_thresholds(logits_BN, occupied_BN, torch.tensor([0.5]))[:, 0]
 
 
 def cube_points(count=200_000):

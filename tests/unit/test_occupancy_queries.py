@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+from samples import iou
 
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.pose import Pose
 from stereo_occ.geometry.rotations import random_rotations
-from stereo_occ.metrics.volumetric import iou
 from stereo_occ.occupancy.contains import contains
 from stereo_occ.occupancy.pools import box_pool, surface_pool
 from stereo_occ.occupancy.queries import bbox_queries, cube_queries, outside_queries, surface_queries
