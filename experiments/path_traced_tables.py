@@ -12,18 +12,18 @@ TRACED = HERE / "path_traced"
 WAYS = ("masks", "both boxes", "left box alone")
 #: Weights and pictures, and where their results are.
 MEASURED = {
-    ("before", "path-traced"): TRACED / "before",
-    ("before", "the project's own, without shadows"): TRACED / "before" / "own_shader",
-    ("now", "path-traced"): TRACED,
-    ("now", "the project's own, without shadows"): TRACED / "own_shader",
+    ("previous", "path-traced"): TRACED / "before",
+    ("previous", "the project's own, without shadows"): TRACED / "before" / "own_shader",
+    ("shipped", "path-traced"): TRACED,
+    ("shipped", "the project's own, without shadows"): TRACED / "own_shader",
 }
 
 
 def reached() -> str:
-    """IoU by what is told, and the errors with both boxes, of the weights of now and before."""
+    """IoU of meshes by what is told, and the errors with both boxes, of the shipped and the previous weights."""
     head = (
-        "weights", "pictures", *(f"`iou`, {way}" for way in WAYS), "both boxes: mug / bowl / bottle",
-        "height, width, centre off",
+        "weights", "pictures", *(f"`mesh_iou`, {way}" for way in WAYS), "both boxes: mug / bowl / bottle",
+        "both boxes: median errors of height, width, centre",
     )  # fmt: skip
     rows = []
     for (weights, pictures), folder in MEASURED.items():
@@ -54,11 +54,11 @@ def looks() -> str:
         for key, values in now.items()
         if key.startswith("both boxes, ")
     ]
-    return cells.table(("object", "pairs", "`iou` now", "before"), rows)
+    return cells.table(("object", "pairs", "`mesh_iou`", "previous weights"), rows)
 
 
 def less_before() -> str:
-    """The weights of now less those of before on path-traced pairs, with intervals over objects."""
+    """The shipped weights less the previous ones on path-traced pairs, with intervals over objects."""
     now, before = (_by_pair(folder / "per_object.csv") for folder in (TRACED, TRACED / "before"))
     rows = []
     for way in WAYS:

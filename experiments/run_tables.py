@@ -38,7 +38,7 @@ LOOKS = {
 
 #: Rows of the answer to the paper's question: the name of the run, and what a reader is told of it.
 ASKED = {
-    MONO: "one view: ResNet-18",
+    MONO: "one view: ResNet-18, from scratch",
     "stereo": "a pair: the paper's stereo network",
     "plane_sweep_guided": "a calibrated pair: `plane_sweep_guided`",
 }
