@@ -12,7 +12,7 @@ from stereo_occ.geometry.camera import transform_points
 from stereo_occ.geometry.crop import Box
 from stereo_occ.metrics.size import size_errors
 from stereo_occ.metrics.solid import mesh_iou
-from stereo_occ.reconstructor import Reconstructor, SurfaceOptions
+from stereo_occ.reconstructor import Reconstruction, Reconstructor, SurfaceOptions
 
 #: Of a reconstruction; lengths in metres.
 COLUMNS = ("iou", "height_error", "width_error", "center_error")
@@ -48,19 +48,14 @@ class Photographs:
         return np.array([list(vars(Box.of_mask(mask_HW)).values()) for mask_HW in self.mask_2HW])
 
 
-def measured(reconstruct: Reconstructor, photographs: Photographs, told: Told) -> list[float]:
-    """The values of ``COLUMNS``."""
-    return compared(reconstructed(reconstruct, photographs, told), photographs)
-
-
-def reconstructed(reconstruct: Reconstructor, photographs: Photographs, told: Told) -> Trimesh:
-    """The mesh that is measured; left camera's frame, metres.
+def reconstructed(reconstruct: Reconstructor, photographs: Photographs, told: Told) -> Reconstruction:
+    """What is measured.
 
     Raises:
         UserError: nothing is found to be occupied, or the object is not found in the other image.
     """
     left, right = photographs.rgb_2HW3
-    return reconstruct(left, right, photographs.pair, surface=SurfaceOptions(resolution=96), **told).mesh
+    return reconstruct(left, right, photographs.pair, surface=SurfaceOptions(resolution=96), **told)
 
 
 def compared(mesh: Trimesh, photographs: Photographs) -> list[float]:

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 import torch
 from omegaconf import OmegaConf
+from scipy.stats import spearmanr
 from tqdm import tqdm
 
-from experiments.whole_pairs import COLUMNS, Photographs, Told, measured
+from experiments.whole_pairs import COLUMNS, Photographs, Told, compared, reconstructed
 from stereo_occ.calibration import Lens, RealCamera, RealPair
 from stereo_occ.cli import compose_config
 from stereo_occ.config import TrainConfig
@@ -122,8 +123,9 @@ def main() -> None:
     reconstruct = Reconstructor.from_checkpoint("field")
     results: dict[str, Any] = {"environment": environment(), "pairs": options.count}
     lines = [
-        "| surroundings | told | `iou` | height error | width error | centre error | failed |",
-        "|---" * 7 + "|",
+        "| surroundings | told | `mesh_iou` | `confidence` | rank correlation of the two | height error | width error "
+        "| centre error | failed |",
+        "|---" * 9 + "|",
     ]
     for background in ("clutter", "photographs"):
         config = OmegaConf.to_object(
@@ -135,17 +137,26 @@ def main() -> None:
             for way, tell in WAYS.items():
                 try:
                     told = tell(pair, np.random.default_rng(number))
-                    values[way].append(measured(reconstruct, pair, told))
+                    found = reconstructed(reconstruct, pair, told)
+                    values[way].append([*compared(found.mesh, pair), found.confidence])
                 except UserError:
-                    values[way].append([0.0, *[np.inf] * 3])
+                    values[way].append([0.0, *[np.inf] * 3, 0.0])
         for way, rows in values.items():
-            iou_P, *errors_3P = np.array(rows).T
+            iou_P, *errors_3P, confidence_P = np.array(rows).T
+            correlation = float(spearmanr(iou_P, confidence_P).statistic)
             medians = dict(zip(COLUMNS[1:], np.median(errors_3P, axis=1).tolist(), strict=True))
             failed = int(np.isinf(errors_3P[0]).sum())
             known = {name: value if np.isfinite(value) else None for name, value in medians.items()}
-            results[f"{background}, {way}"] = {"iou": float(iou_P.mean()), **known, "failed": failed}
+            means = {"mesh_iou": float(iou_P.mean()), "confidence": float(confidence_P.mean())}
+            results[f"{background}, {way}"] = {
+                **means,
+                "rank_correlation": correlation,
+                **known,
+                "failed": failed,
+            }
             errors = " | ".join(f"{1000 * value:.0f} mm" for value in medians.values())
-            lines.append(f"| {background} | {way} | {iou_P.mean():.3f} | {errors} | {failed} |")
+            sure = f"{confidence_P.mean():.3f} | {correlation:.2f}"
+            lines.append(f"| {background} | {way} | {iou_P.mean():.3f} | {sure} | {errors} | {failed} |")
     (HERE / "results.json").write_text(json.dumps(results, indent=1) + "\n")
     (HERE / "table.md").write_text("\n".join(lines) + "\n")
 

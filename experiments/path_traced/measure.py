@@ -59,7 +59,7 @@ def measure_pair(reconstruct: Reconstructor, pair: RenderedPair, way: str) -> tu
     """A row, and the mesh (left camera's frame, metres) where there is one."""
     name = pair.source.category, pair.source.object_id, pair.view, pair.look, way
     try:
-        mesh = reconstructed(reconstruct, pair.photographs, WAYS[way](pair.photographs))
+        mesh = reconstructed(reconstruct, pair.photographs, WAYS[way](pair.photographs)).mesh
     except UserError as error:
         return Row(*name, [0.0, *[np.inf] * 3], str(error)), None
     return Row(*name, compared(mesh, pair.photographs)), mesh
@@ -85,7 +85,7 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
 def table(found: dict[str, dict[str, Any]]) -> str:
     """One line for each group of rows."""
     lines = [
-        "| told | pairs | `iou` (mug / bowl / bottle) | height error | width error | centre error | failed |",
+        "| told | pairs | `mesh_iou` (mug / bowl / bottle) | height error | width error | centre error | failed |",
         "|---" * 7 + "|",
     ]
     for name, values in found.items():
