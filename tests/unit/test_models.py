@@ -89,6 +89,7 @@ def leave_zero(model):
         (["model=plane_sweep_stereo", "model.views=left"], "laptop", 64, 2_963_825),
         (["model=plane_sweep_stereo", "model/encoder=dilated_resnet"], "laptop", 64, 4_841_985),
         (["model=plane_sweep_guided"], "laptop", 64, 2_978_930),
+        (["model=plane_sweep_guided_mono"], "laptop", 64, 2_978_930),  # the same
     ],
 )
 def test_parameter_counts(overrides, scale, side, count):
