@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -74,17 +74,19 @@ def export(cfg: DictConfig) -> list[Path]:
 
 def _metrics(path: str | None, checkpoint: Mapping[str, Any], run: Path | None) -> dict[str, Any]:
     """Of an evaluation's ``metrics.json``; else of the checkpoint's validation, or what exported weights came with."""
-    if path is None and run is None:
+    if path is not None:
+        return _read(Path(path), lambda content: content["metrics"])
+    if run is None:
         return checkpoint["metrics"] or {}
-    file = run / "metrics.json" if path is None else Path(path)
-    if path is None and not file.is_file():
+    file, step = run / "metrics.json", checkpoint["global_step"]
+    if not file.is_file():
         return {}
+    return _read(file, lambda content: next((e for e in content["history"] if e["step"] == step), {}))
+
+
+def _read(file: Path, part: Callable[[Any], Mapping[str, Any]]) -> dict[str, Any]:
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-        if path is None:
-            steps = {entry["step"]: entry for entry in content["history"]}
-            return dict(steps.get(checkpoint["global_step"], {}))
-        return dict(content["metrics"])
+        return dict(part(json.loads(file.read_text(encoding="utf-8"))))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise UserError(f"metrics={file}: cannot be read; give the metrics.json of an evaluation") from error
 

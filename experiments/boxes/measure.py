@@ -41,7 +41,7 @@ def by_hand(photographs: Photographs, error: float, rng: np.random.Generator) ->
     """Both boxes, every edge drawn with an error of so many pixels."""
     boxes_24 = photographs.boxes_24 + error * rng.standard_normal((2, 4))
     height, width = photographs.mask_2HW.shape[1:]
-    return boxes_24.clip(-0.5, [width - 0.5, height - 0.5] * 2).tolist()
+    return list(boxes_24.clip(-0.5, [width - 0.5, height - 0.5] * 2).tolist())
 
 
 WAYS: dict[str, Callable[[Photographs, np.random.Generator], Told]] = {
