@@ -139,11 +139,19 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
         "reached": partial(run_tables.reached, WHOLE),
         "over_mono": partial(run_tables.over_mono, WHOLE, "test", ("iou", "iou_unrotated", "handle_recall")),
         "over_mono_real": partial(run_tables.over_mono, WHOLE, "real", ("iou", "iou_unrotated")),
+        "pair": partial(
+            run_tables.less,
+            {
+                "test objects": WHOLE / "guided_against_its_mono",
+                "real objects": WHOLE / "guided_against_its_mono_real",
+            },
+            ("iou", "recall_2_visible", "recall_2_occluded"),
+        ),
         "quarter": partial(
             run_tables.less,
             {
                 f"`{name}`, {where} objects": WHOLE / f"{name}_against_quarter{suffix}"
-                for name in (MONO, "stereo", "plane_sweep_guided")
+                for name in (MONO, "stereo", TWIN, "plane_sweep_guided")
                 for where, suffix in (("test", ""), ("real", "_real"))
             },
             ("iou",),

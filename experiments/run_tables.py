@@ -14,6 +14,7 @@ from runs import (
     REPEATED,
     RUNS,
     SURFACES,
+    TWIN,
     WHOLE,
     load,
     metrics_of,
@@ -39,6 +40,7 @@ LOOKS = {
 #: Rows of the answer to the paper's question: the name of the run, and what a reader is told of it.
 ASKED = {
     MONO: "one view: ResNet-18, from scratch",
+    TWIN: "one view: the network of the last row without its second view",
     "stereo": "a pair: the paper's stereo network",
     "plane_sweep_guided": "a calibrated pair: `plane_sweep_guided`",
 }

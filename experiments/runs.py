@@ -39,6 +39,7 @@ RUNS = {
     LONGER / "plane_sweep_stereo_aided": f"experiment=recipe {AIDED} steps=20000",
     WHOLE / "mono_scratch": "experiment=recipe model=mono_scratch scale.batch_size=8",
     WHOLE / "stereo": "experiment=recipe model=stereo scale.batch_size=8",
+    WHOLE / "plane_sweep_guided_left": f"experiment=recipe {GUIDED} model.views=left scale.batch_size=8",
     WHOLE / "plane_sweep_guided": f"experiment=recipe {GUIDED} scale.batch_size=8",
     FREE / "mono_scratch": "experiment=recipe placement=free model=mono_scratch steps=10000",
     FREE / "stereo": "experiment=recipe placement=free model=stereo steps=10000",

@@ -10,7 +10,7 @@ for material in plain glossy; do
     for texture in none procedural; do
         name=${material}_$texture share=()
         if [ $texture = procedural ]; then share=(texture.share=1); fi
-        judge "$runs/$name" checkpoint=outputs/field/best.ckpt subset=test data=procedural views=2 keep=false workers=1 \
+        judge "$runs/$name" checkpoint=field subset=test data=procedural views=2 keep=false workers=1 \
             material=$material texture=$texture "${share[@]}"
         keep "$runs/$name" $name
     done

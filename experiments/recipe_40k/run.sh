@@ -14,6 +14,10 @@ against stereo_against_mono $family/stereo $family/mono_scratch
 against guided_against_mono $family/plane_sweep_guided $family/mono_scratch
 against guided_against_paper_stereo $family/plane_sweep_guided $family/stereo
 against guided_against_its_mono $family/plane_sweep_guided $family/plane_sweep_guided_left
+against twin_against_paper_stereo $family/plane_sweep_guided_left $family/stereo
+if [ -n "${REAL:-}" ]; then
+    against guided_against_its_mono_real $family/plane_sweep_guided $family/plane_sweep_guided_left real
+fi
 for name in mono_scratch stereo plane_sweep_guided_left plane_sweep_guided; do
     against ${name}_against_quarter $family/$name recipe_10k/$name
     if [ -n "${REAL:-}" ]; then
