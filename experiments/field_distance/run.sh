@@ -5,12 +5,16 @@ set -euo pipefail
 family=field_distance
 source "$(dirname "$0")/../family.sh"
 
-for distance in 0.35 0.5 0.7 1.0; do
-    for baseline in 0.063 0.12; do
-        name=${baseline}_$distance
-        judge "$runs/$name" checkpoint=field data=meshes data.root="$REAL" data.views=2 texture=own rig=zed_mini \
-            "rig.baseline=[$baseline,$baseline]" "rig.distance=[$distance,$distance]" views=2 keep=false workers=1
-        keep "$runs/$name" $name
+distances="0.35 0.5 0.7 1.0" baselines="0.063 0.12"
+for distance in $distances; do
+    for baseline in $baselines; do
+        judge "$runs/${baseline}_$distance" checkpoint=field data=meshes data.root="$REAL" data.views=2 texture=own \
+            rig=zed_mini "rig.baseline=[$baseline,$baseline]" "rig.distance=[$distance,$distance]" views=2 keep=false workers=1
+    done
+done
+for distance in $distances; do
+    for baseline in $baselines; do
+        keep "$runs/${baseline}_$distance" "${baseline}_$distance"
     done
     differ wider_$distance "$runs/0.12_$distance" "$runs/0.063_$distance"
 done
