@@ -28,6 +28,9 @@ REMEDIES = {
 #: How torch begins what it raises where there is no memory.
 NO_MEMORY = ("[enforce fail at alloc_cpu", "CUDA out of memory", "DefaultCPUAllocator")
 
+#: How it begins what it raises where a process that loads data was killed, or has crashed.
+LOADER_DIED = "DataLoader worker (pid"
+
 
 def refusal(error: BaseException) -> str | None:
     """One line on an error that the system has caused; None for any other."""
@@ -39,6 +42,11 @@ def refusal(error: BaseException) -> str | None:
         isinstance(error, RuntimeError) and any(begin in str(error)[:300] for begin in NO_MEMORY)
     ):
         return "not enough memory; ask for less (batch_size, views, workers, draws), or close other programs"
+    if isinstance(error, RuntimeError) and str(error).startswith(LOADER_DIED):
+        return (
+            f"a process that loads data has died ({str(error).strip()}); where memory is short ask for fewer "
+            f"(trainer.workers), and go on with the same command"
+        )
     return None
 
 

@@ -1,6 +1,8 @@
 """Mistakes and refusals as one line, wherever they happened."""
 
 import errno
+import os
+import signal
 
 import pytest
 from torch.utils.data import DataLoader, Dataset
@@ -28,6 +30,20 @@ def test_a_mistake_found_by_a_loader_is_one_line(workers):
     with pytest.raises(UserError) as raised:
         list(DataLoader(Broken(), num_workers=workers))
     assert one_line(raised.value) == MISTAKE
+
+
+class Killed(Broken):
+    def __getitem__(self, index):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_loader_that_is_killed_is_one_line():
+    with pytest.raises(RuntimeError) as raised:
+        list(DataLoader(Killed(), num_workers=1))
+    line = one_line(raised.value)
+    assert line.startswith("a process that loads data has died (DataLoader worker (pid")
+    assert "trainer.workers" in line
+    assert "\n" not in line
 
 
 def test_what_the_system_refuses_says_what_to_do():
