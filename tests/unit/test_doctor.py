@@ -21,7 +21,7 @@ FOUND = {
 def report(capsys, monkeypatch, **probes):
     """Lines and exit code of the report."""
     monkeypatch.setattr(doctor, "_probe", (FOUND | probes).__getitem__)
-    monkeypatch.setattr(doctor, "_cores", lambda: 2)
+    monkeypatch.setattr(doctor, "available_cores", lambda: 2)
     with pytest.raises(SystemExit) as stop:
         doctor.main()
     return capsys.readouterr().out.splitlines(), stop.value.code
