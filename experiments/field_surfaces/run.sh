@@ -12,9 +12,9 @@ for material in plain glossy; do
         if [ $texture = procedural ]; then share=(texture.share=1); fi
         judge "$runs/$name" checkpoint=field subset=test data=procedural views=2 keep=false workers=1 \
             material=$material texture=$texture "${share[@]}"
-        keep "$runs/$name" $name
     done
 done
+for name in plain_none plain_procedural glossy_none glossy_procedural; do keep "$runs/$name" $name; done
 for pair in glossy_none-plain_none plain_procedural-plain_none glossy_procedural-glossy_none; do
     differ $pair "$runs/${pair%-*}" "$runs/${pair#*-}"
 done
