@@ -62,7 +62,7 @@ def repair(mesh: Trimesh) -> Repair:
         raise UserError("has no triangle with three different corners")
     to_unit = _Frame(welded)
     unit = source = to_unit(welded)
-    if not (unit.body_count == 1 and _is_sound(unit)):
+    if not (_is_sound(unit) and unit.body_count == 1):
         unit, source, more = _solid(unit)
         if more:
             steps += more
