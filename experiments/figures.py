@@ -43,7 +43,7 @@ def recipe_curves(family: Path) -> None:
         axis.set(title=metric, xlabel="step", ylim=(0, None))
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("macro IoU, validation objects")
-    axes[-1].legend(fontsize=7, loc="lower right")
+    axes[-1].legend(fontsize=7, loc="best")
     figure.savefig(family / "curves.png", dpi=110)
 
 
