@@ -41,8 +41,10 @@ def write_examples(
         predicted = predictor.mesh(view, views, resolution)
         name = f"{example.id.category}/{example.id.object_id}_view{example.id.view}"
         for kind, mesh in (("predicted", predicted), ("true", example.true)):
+            path = folder / "meshes" / f"{name}_{kind}.glb"
+            path.unlink(missing_ok=True)  # of a former evaluation
             if len(mesh.faces):
-                with whole_file(folder / "meshes" / f"{name}_{kind}.glb") as file:
+                with whole_file(path) as file:
                     mesh.export(file, file_type="glb")
         strip = comparison(views.left_BCHW[0], views.right_BCHW[0], predicted, example.true, view.rig)
         with whole_file(folder / "pictures" / f"{name}.png") as file:

@@ -179,11 +179,10 @@ class StereoRenderer:
     def _samples(self, camera: Camera) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Premultiplied colour and coverage ``(H, W, 4)`` and depth ``(H, W)`` of the samples of all pixels."""
         factor = self._supersampling
-        scale = np.array([factor, factor, 1])[:, None]
-        K = scale * camera.K
+        K = camera.resized(factor * camera.width, factor * camera.height).K
         self._camera.fx, self._camera.fy = K[0, 0], K[1, 1]
         # OpenGL measures the principal point from the corner of the image, we from the centre of its first pixel.
-        self._camera.cx, self._camera.cy = K[0, 2] + factor / 2, K[1, 2] + factor / 2
+        self._camera.cx, self._camera.cy = K[0, 2] + 0.5, K[1, 2] + 0.5
         self._scene.set_pose(self._camera_node, np.linalg.inv(camera.camera_from_rig) @ CV_FROM_GL)
         renderer = process_renderer(factor * camera.width, factor * camera.height)
         rgba, depth = renderer.render(self._scene, self._flags)

@@ -126,6 +126,17 @@ def test_the_stored_threshold_decides(workshop, run, tmp_path):
     assert len({metrics["test/iou_at_0.5"] for metrics in results.values()}) == 1
 
 
+def test_an_example_that_has_become_empty_leaves_no_mesh(workshop, run, tmp_path):
+    checkpoint = read_checkpoint(run / "best.ckpt")
+    meshes = {}
+    for threshold in (0.01, 0.9999):
+        checkpoint["state_dict"]["threshold"] = torch.tensor(threshold)
+        torch.save(checkpoint, tmp_path / "best.ckpt")
+        workshop.evaluate(tmp_path / "best.ckpt", tmp_path / "out")
+        meshes[threshold] = len(list((tmp_path / "out").glob("meshes/*/*_predicted.glb")))
+    assert meshes == {0.01: 3, 0.9999: 0}
+
+
 def test_batches_do_not_change_the_result(workshop, run, tmp_path, evaluation):
     one_by_one = workshop.evaluate(run / "best.ckpt", tmp_path, "subset=val", "batch_size=1", "examples=0")
     assert one_by_one == pytest.approx(
