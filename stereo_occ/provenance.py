@@ -42,11 +42,15 @@ def environment() -> dict[str, Any]:
 
 
 def commit(package: Path = PACKAGE) -> dict[str, Any]:
-    """``commit`` and whether tracked files differ from it (``dirty``); both None outside of a checkout."""
+    """``commit`` and whether code, settings or weights differ from it (``dirty``); both None outside of a checkout.
+
+    Pages and results do not count: one command may write several results.
+    """
     own_file = f"{package.name}/__init__.py"
     if _git(package.parent, "ls-files", "--error-unmatch", own_file) is None:
         return {"commit": None, "dirty": None}
-    changes = _git(package.parent, "status", "--porcelain", "--untracked-files=no")
+    deciding = package.name, "conf", "*.py", "requirements.lock"
+    changes = _git(package.parent, "status", "--porcelain", "--untracked-files=no", "--", *deciding)
     return {"commit": _git(package.parent, "rev-parse", "HEAD"), "dirty": changes != ""}
 
 

@@ -33,6 +33,8 @@ def test_the_commit_is_that_of_the_checkout_that_holds_the_package(tmp_path):
     package = tmp_path / "package"
     package.mkdir()
     (package / "__init__.py").write_text("")
+    page = tmp_path / "README.md"
+    page.write_text("")
     assert commit(package) == {"commit": None, "dirty": None}
     subprocess.run([*git, "init", "-q"], check=True)
     assert commit(package) == {"commit": None, "dirty": None}  # a repository that does not hold it
@@ -41,6 +43,8 @@ def test_the_commit_is_that_of_the_checkout_that_holds_the_package(tmp_path):
     head = subprocess.run(
         [*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True
     ).stdout.strip()
+    assert commit(package) == {"commit": head, "dirty": False}
+    page.write_text("a result")
     assert commit(package) == {"commit": head, "dirty": False}
     (package / "__init__.py").write_text("x = 1\n")
     assert commit(package) == {"commit": head, "dirty": True}
