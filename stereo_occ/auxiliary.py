@@ -58,8 +58,8 @@ def auxiliary_losses(
 
     true_B2HW = batch.truth.depth_B2HW
     seen_MHW = cells((true_B2HW > 0).float())
-    offsets_B211 = batch.views.camera_from_rig_B244[:, :, 2, 3, None, None]
-    sums_MHW = cells(torch.where(true_B2HW > 0, true_B2HW - offsets_B211, 0))  # of the seen part of each cell
+    origin_B211 = batch.truth.origin_B2[:, :, None, None]
+    sums_MHW = cells(torch.where(true_B2HW > 0, true_B2HW - origin_B211, 0))  # of the seen part of each cell
 
     def depth_loss(depth_MHW: Tensor) -> Tensor:
         return (seen_MHW * depth_MHW - sums_MHW).abs().sum() / seen_MHW.sum().clamp(min=1e-6)

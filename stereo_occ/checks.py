@@ -14,13 +14,21 @@ from stereo_occ.cores import beyond_cores
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.controls import CONTROLS
 from stereo_occ.data.look import check_look
-from stereo_occ.data.rigs import DISTANCE, FOV, HALF_ANGLE, RigConfig, ToedInRigConfig, build_rig
+from stereo_occ.data.rigs import (
+    DISTANCE,
+    FOV,
+    HALF_ANGLE,
+    RectifiedRigConfig,
+    RigConfig,
+    ToedInRigConfig,
+    build_rig,
+)
 from stereo_occ.data.scene import draw_scene
 from stereo_occ.data.splits import SUBSETS, split_views, subset_sizes
 from stereo_occ.errors import UserError
 from stereo_occ.group import started_elsewhere
 from stereo_occ.loggers.config import LoggerConfig, logger_problems
-from stereo_occ.models.build import build_model
+from stereo_occ.models.build import build_model, of_one_rig
 from stereo_occ.optimization import OPTIMIZERS, SCHEDULES
 from stereo_occ.packaged import is_there, shipped
 from stereo_occ.precision import PRECISIONS, on_gpu
@@ -192,19 +200,13 @@ def _model(cfg: DictConfig) -> Iterator[str]:
     config = OmegaConf.to_object(cfg.rig)
     assert isinstance(config, RigConfig)
     rig = build_rig(config, cfg.data.image_side)
-    if cfg.rig.kind != ToedInRigConfig.kind and _of_one_rig(cfg.model):
+    if cfg.rig.kind != ToedInRigConfig.kind and of_one_rig(cfg.model):
         yield (
             f"model.cost_volume.name={cfg.model.cost_volume.name}: has the disparities of one rig, and rig.kind="
             f"{cfg.rig.kind} gives each pair its own; say model/cost_volume=plane_sweep, which reads the cameras"
         )
     with torch.device("meta"):
         yield from _refusal(build_model, OmegaConf.to_container(cfg.model, resolve=True), rig, False)
-
-
-def _of_one_rig(model: DictConfig) -> bool:
-    """Whether the slices of the model's cost volume are the disparities that a rig can have."""
-    volume = model.get("cost_volume") or {}
-    return volume.get("name") == "correlation_signed" or volume.get("disparities", 0) is None
 
 
 def _schedule(cfg: DictConfig) -> Iterator[str]:
@@ -239,21 +241,20 @@ def _aids(cfg: DictConfig) -> Iterator[str]:
     for key, limit in upper.items():
         if not 0 <= augmentation[key] <= limit:
             yield f"augmentation.{key}={augmentation[key]}: must be between 0 and {limit}"
-    if augmentation.roll_deg and not _reads_cameras(cfg.model):
+    if augmentation.roll_deg and cfg.model.name in ("mono", "stereo"):
         yield (
-            f"augmentation.roll_deg={augmentation.roll_deg}: model={cfg.model.name} does not read the cameras that "
-            f"roll; say augmentation.roll_deg=0"
+            f"augmentation.roll_deg={augmentation.roll_deg}: model={cfg.model.name} has no way to know how its cameras "
+            f"have rolled; say augmentation.roll_deg=0"
+        )
+    elif augmentation.roll_deg and cfg.rig.kind == RectifiedRigConfig.kind:
+        yield (
+            f"augmentation.roll_deg={augmentation.roll_deg}: would turn the crops of rig.kind={cfg.rig.kind} about "
+            f"points outside of them, and the object out of the picture; say augmentation.roll_deg=0"
         )
     yield from _at_least(0, cfg, "auxiliary.mask", "auxiliary.depth", "auxiliary.surface")
     decay = cfg.averaging.decay
     if decay is not None and not 0 <= decay < 1:
         yield f"averaging.decay={decay}: must be at least 0 and below 1, or null"
-
-
-def _reads_cameras(model: DictConfig) -> bool:
-    return model.name not in ("mono", "stereo") or "plane_sweep" in OmegaConf.select(
-        model, "cost_volume.name", default=""
-    )
 
 
 def _settings(cfg: DictConfig) -> Iterator[str]:

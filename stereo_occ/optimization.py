@@ -12,11 +12,15 @@ OPTIMIZERS: dict[str, type[Adam]] = {"adam": Adam, "adamw": AdamW}
 SCHEDULES = ("constant", "cosine")
 
 
-def build_optimizer(config: OptimizerConfig, model: nn.Module) -> Optimizer:
-    """The optimiser of all parameters of ``model``."""
+def build_optimizer(config: OptimizerConfig, model: nn.Module, fused: bool = True) -> Optimizer:
+    """The optimiser of all parameters of ``model``.
+
+    Args:
+        fused: all in one pass, which is faster; in mixed precision Lightning clips no gradients for such an optimiser.
+    """
     beta1, beta2 = config.betas
     return OPTIMIZERS[config.name](
-        model.parameters(), lr=config.lr, betas=(beta1, beta2), weight_decay=config.weight_decay, fused=True
+        model.parameters(), lr=config.lr, betas=(beta1, beta2), weight_decay=config.weight_decay, fused=fused
     )
 
 

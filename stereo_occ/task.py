@@ -130,7 +130,8 @@ class OccupancyTask(lightning.LightningModule):
         self.log("val/threshold", self.threshold)
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
-        optimizer = build_optimizer(self.config.optimizer, self)
+        fused = self.config.trainer.gradient_clip is None
+        optimizer = build_optimizer(self.config.optimizer, self, fused)
         schedule = build_schedule(self.config.scheduler, optimizer, self.config.steps)
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
 

@@ -114,10 +114,8 @@ def begin_with(name: str, model: OccupancyModel, config: Mapping[str, Any]) -> N
     except UserError as error:
         raise UserError(f"init: {error}") from error
     theirs, ours = flat(trained.config.model, "model."), flat(config, "model.")
-    other = sorted(
-        key for key in theirs | ours if theirs.get(key) != ours.get(key) and key != "model.encoder.weights"
-    )
+    other = sorted(key for key in theirs | ours if theirs.get(key) != ours.get(key))
     if other:
-        says = ", ".join(f"{key}={theirs.get(key)}" for key in other)
+        says = ", ".join(f"{key}={'null' if theirs.get(key) is None else theirs[key]}" for key in other)
         raise UserError(f"init={name}: is of another model; say {says}, or leave init out")
     model.load_state_dict(trained.model.state_dict())

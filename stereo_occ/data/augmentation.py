@@ -65,7 +65,11 @@ def mirrored(batch: Batch, chosen_B: Tensor) -> Batch:
             for name, queries in batch.queries.items()
         },
         truth=truth
-        and ImageTruth(*(choose(image.flip(1, 3), image) for image in (truth.mask_B2HW, truth.depth_B2HW))),
+        and ImageTruth(
+            choose(truth.mask_B2HW.flip(1, 3), truth.mask_B2HW),
+            choose(truth.depth_B2HW.flip(1, 3), truth.depth_B2HW),
+            choose(truth.origin_B2.flip(1), truth.origin_B2),
+        ),
     )
 
 
@@ -108,6 +112,7 @@ def rolled(batch: Batch, angle_B: Tensor) -> Batch:
         and ImageTruth(
             turned(truth.mask_B2HW[:, :, None], "bilinear", "zeros")[:, :, 0],
             turned(truth.depth_B2HW[:, :, None], "nearest", "zeros")[:, :, 0],
+            truth.origin_B2,
         ),
     )
 

@@ -22,10 +22,17 @@ class Queries:
 
 @dataclass(frozen=True)
 class ImageTruth:
-    """What the images show: share of each pixel that is the object, depth in the rig's unit with 0 for background."""
+    """What the images show, whatever a network is told of their cameras.
+
+    Attributes:
+        mask_B2HW: share of each pixel that is the object.
+        depth_B2HW: along the optical axis in the rig's unit, 0 for background.
+        origin_B2: depth of the rig's origin.
+    """
 
     mask_B2HW: Tensor
     depth_B2HW: Tensor
+    origin_B2: Tensor
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from stereo_occ.data.batch import Batch, ImageTruth, ViewId
+from stereo_occ.data.batch import Batch, ViewId, map_tensors
 
 
 @dataclass
@@ -90,12 +90,12 @@ def _with_right_image(batch: Batch, right_of: Callable[[Tensor, Tensor], Tensor]
     """The batch with a right image, and its truth, made of the left and the right one."""
     views, truth = batch.views, batch.truth
 
-    def pair(images_B2HW: Tensor) -> Tensor:
-        left_BHW, right_BHW = images_B2HW.unbind(1)
-        return torch.stack([left_BHW, right_of(left_BHW, right_BHW)], dim=1)
+    def pair(of_both: Tensor) -> Tensor:
+        left, right = of_both.unbind(1)
+        return torch.stack([left, right_of(left, right)], dim=1)
 
     return replace(
         batch,
         views=replace(views, right_BCHW=right_of(views.left_BCHW, views.right_BCHW)),
-        truth=truth and ImageTruth(pair(truth.mask_B2HW), pair(truth.depth_B2HW)),
+        truth=truth and map_tensors(truth, pair),
     )

@@ -19,10 +19,9 @@ from stereo_occ.errors import UserError
 from stereo_occ.models.base import StereoViews
 from stereo_occ.occupancy.queries import (
     LabelledPoints,
-    bbox_queries,
     cube_queries,
     outside_queries,
-    surface_queries,
+    pool_queries,
 )
 
 #: Of the random numbers of a batch, after its seed and position; those of its points have none.
@@ -158,7 +157,9 @@ class PairsDataset(Dataset[Batch]):
     def image_truth(self, items: Sequence[int]) -> ImageTruth:
         """Masks and depths of ``items``."""
         return ImageTruth(
-            _float(self._pairs_of(Shard.mask, items)).div_(255), _float(self._pairs_of(Shard.depth, items))
+            _float(self._pairs_of(Shard.mask, items)).div_(255),
+            _float(self._pairs_of(Shard.depth, items)),
+            _float(self._pairs_of(_origin_depths, items)),
         )
 
     def _pairs_of(
@@ -212,11 +213,11 @@ class TrainingPairs(PairsDataset):
         rng = np.random.default_rng([self.seed, draw.position])
         parts = []
         if self.counts["box"]:
-            parts.append(bbox_queries(box, pose, self.counts["box"], rng))
+            parts.append(pool_queries(box, pose, self.counts["box"], rng))
         if self.counts["outside"]:
             parts.append(outside_queries(box, pose, self.counts["outside"], rng))
         if self.counts["surface"]:
-            parts.append(surface_queries(shard.pool("surface"), pose, self.counts["surface"], rng))
+            parts.append(pool_queries(shard.pool("surface"), pose, self.counts["surface"], rng))
         return LabelledPoints(
             np.concatenate([part.points_N3 for part in parts]),
             np.concatenate([part.occupied_N for part in parts]),
@@ -247,7 +248,7 @@ class EvaluationPairs(PairsDataset):
         shard, view = self.locate(item)
         pose, pool = shard.pose(view), shard.pool("box")
         rng = np.random.default_rng([crc32(f"{shard.category}/{shard.object_id}".encode()), view])
-        bbox = bbox_queries(pool, pose, self.points, rng)
+        bbox = pool_queries(pool, pose, self.points, rng)
         cube = cube_queries(pool, pose, self.points, rng)
         return {
             "bbox": bbox,
@@ -259,6 +260,11 @@ class EvaluationPairs(PairsDataset):
 def whole_batch(batch: Any) -> Any:
     """Collate nothing. It is here and not beside the loaders so that loading processes need not import lightning."""
     return batch
+
+
+def _origin_depths(shard: Shard, view: int) -> NDArray[np.float64]:
+    """Of the rig's origin in both images ``(2,)``."""
+    return shard.cameras(view)[1][:, 2, 3]
 
 
 def _float(array: NDArray[np.generic]) -> torch.Tensor:

@@ -64,6 +64,14 @@ def build_model(config: Config, rig: StereoRig, load_weights: bool = True) -> Oc
     return channels_last(_lookup(MODELS, config, "model")(config, rig, load_weights))
 
 
+def of_one_rig(config: Config) -> bool:
+    """Whether the slices of the model's cost volume are the disparities that its rig can have."""
+    volume = config.get("cost_volume") or {}
+    constructor = COST_VOLUMES.get(volume.get("name", ""))
+    takes_disparities = constructor is not None and "disparities" in _keywords(constructor)
+    return takes_disparities and volume.get("disparities") is None
+
+
 def channels_last(model: OccupancyModel) -> OccupancyModel:
     """Lay out the weights of 2D and 3D convolutions channels-last, which runs faster."""
     for module in model.modules():

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Sequence
 from functools import partial
 from itertools import cycle, islice
-from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -23,7 +22,7 @@ class ImageEncoder(nn.Module):
         channels, stride: of the features.
     """
 
-    image_multiple: ClassVar[int]
+    image_multiple: int
     channels: int
     stride: int
 
@@ -103,7 +102,6 @@ class ResNet18(ImageEncoder):
         UserError: on another stride, or on weights that are unknown or can neither be found nor fetched.
     """
 
-    image_multiple = 1
     mean_C11: Tensor
     std_C11: Tensor
 
@@ -114,6 +112,7 @@ class ResNet18(ImageEncoder):
 
         super().__init__()
         self.stride = choose_stride("resnet18", stride, (4, 8, 16, 32))
+        self.image_multiple = stride or 1  # without one asked for, nobody looks for places in the map
         source = named_weights(weights) if weights else None
         network = resnet18()
         if source and load_weights:

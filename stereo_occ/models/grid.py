@@ -63,10 +63,10 @@ class Locator(nn.Module):
         """Coarse volumes ``(B, width, cells, cells, cells)`` to grids."""
         features_BCDHW = self.layers(volume_BCDHW)
         weights_BN = self.attention(features_BCDHW).flatten(1).float().softmax(dim=1)
-        pooled_BC = torch.einsum("bcn,bn->bc", features_BCDHW.flatten(2).float(), weights_BN)
-        share_B = torch.sigmoid(self.size(pooled_BC).float()).squeeze(1)
         with torch.autocast(weights_BN.device.type, enabled=False):
             center_B3 = weights_BN @ self.centers_N3
+            pooled_BC = torch.einsum("bcn,bn->bc", features_BCDHW.flatten(2).float(), weights_BN)
+            share_B = torch.sigmoid(self.size(pooled_BC)).squeeze(1)
         return Grid(center_B3, SMALLEST + (1 - SMALLEST) * share_B)
 
 

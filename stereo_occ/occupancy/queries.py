@@ -21,22 +21,14 @@ class LabelledPoints:
     occupied_N: NDArray[np.bool_]
 
 
-def bbox_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
-    """``count`` distinct points of a box pool, posed: the paper's query points.
+def pool_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
+    """``count`` distinct points of a pool, posed; of a box pool, the paper's query points.
 
     Raises:
         UserError: if the pool has fewer points.
     """
-    return _draw(pool, pose, count, rng)
-
-
-def surface_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
-    """``count`` distinct points of a surface pool, posed.
-
-    Raises:
-        UserError: if the pool has fewer points.
-    """
-    return _draw(pool, pose, count, rng)
+    _check_count(count, len(pool))
+    return _posed(pool, pose, rng.choice(len(pool), count, replace=False))
 
 
 def cube_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
@@ -51,7 +43,7 @@ def cube_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Generat
     """
     points_N3 = rng.uniform(-_HALF, _HALF, (count, 3))
     inside_N, whole = _in_box(points_N3, pool, pose)
-    drawn = (_draw if whole else _draw_within)(pool, pose, int(inside_N.sum()), rng)
+    drawn = (pool_queries if whole else _draw_within)(pool, pose, int(inside_N.sum()), rng)
     points_N3[inside_N] = drawn.points_N3
     occupied_N = np.zeros(count, dtype=bool)
     occupied_N[inside_N] = drawn.occupied_N
@@ -68,14 +60,8 @@ def outside_queries(pool: PointPool, pose: Pose, count: int, rng: np.random.Gene
     return LabelledPoints(points_N3[:count], np.zeros(count, dtype=bool))
 
 
-def _draw(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
-    """``count`` distinct points of the pool, posed."""
-    _check_count(count, len(pool))
-    return _posed(pool, pose, rng.choice(len(pool), count, replace=False))
-
-
 def _draw_within(pool: PointPool, pose: Pose, count: int, rng: np.random.Generator) -> LabelledPoints:
-    """The same of those that are in the working volume."""
+    """``count`` distinct points of those of the pool, posed, that are in the working volume."""
     all_points = _posed(pool, pose, rng.permutation(len(pool)))
     (within_M,) = (np.abs(all_points.points_N3) <= _HALF).all(axis=1).nonzero()
     _check_count(count, len(within_M))

@@ -73,6 +73,13 @@ def test_settings_of_a_part_are_checked_as_all_others(folder):
         "stereo_occ: model.encoder.channels=many: must be a whole number",
         "stereo_occ: model.encoder.chanels: unknown key; did you mean model.encoder.channels?",
     ]
+    refused = program(
+        "-m", "stereo_occ.train", "model/cost_volume=difference", "rig=randomised",
+        cwd=folder, STEREO_OCC_PLUGINS="my_parts",
+    )  # fmt: skip
+    assert refused.stderr.startswith(
+        "stereo_occ: model.cost_volume.name=difference: has the disparities of one rig"
+    )
 
 
 def test_a_module_that_is_not_there_is_one_line(monkeypatch):

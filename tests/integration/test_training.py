@@ -156,6 +156,23 @@ def test_weights_of_another_model_are_refused(workshop, run, tmp_path):
         workshop.train(tmp_path / "other", f"init='{run / 'best.ckpt'}'", "model.code_size=8")
 
 
+def test_weights_for_images_normalised_otherwise_are_refused(workshop, tmp_path):
+    common = [
+        o for o in workshop.overrides("logger=none") if not o.startswith(("model.width", "model.encoder"))
+    ]
+    mono = [
+        *common,
+        "model=mono_scratch",
+        "steps=1",
+        "validation.interval=1",
+        "validation.checkpoint_interval=1",
+    ]
+    train_module.train(compose_config("train", mono), tmp_path / "scratch")
+    init = f"init='{tmp_path / 'scratch' / 'best.ckpt'}'"
+    with pytest.raises(UserError, match=r"is of another model; say model\.encoder\.weights=null, or leave"):
+        train_module.train(compose_config("train", [*mono, "model=mono", init]), tmp_path / "other")
+
+
 def test_the_same_seed_gives_the_same_weights_to_the_bit(workshop, run, tmp_path):
     again = workshop.train(tmp_path / "again", "logger=none")
     assert same_weights(run, again)
@@ -395,8 +412,9 @@ def test_a_damaged_shard_is_one_line(workshop, run, tmp_path):
         ["model=mono", "model.encoder.weights=null"],
         ["placement=free", "lights=random", "material=varied", "background=uniform", "queries=mixed"],
         ["data.split=view", "data.views=4", "validation.views=1", "optimizer=adamw", "scheduler=cosine"],
+        ["trainer.gradient_clip=1", "trainer.precision=bf16-mixed", "optimizer=adamw"],
     ],
-    ids=["mono", "varied scenes", "split by view"],
+    ids=["mono", "varied scenes", "split by view", "clipped gradients"],
 )
 def test_other_runs_go_through(workshop, tmp_path, overrides):
     common = [o for o in workshop.overrides() if not o.startswith(("model.width", "model.encoder"))]

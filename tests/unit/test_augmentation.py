@@ -25,11 +25,11 @@ FULL = AugmentationConfig(brightness=0.2, contrast=0.2, noise=0.02, blur=0.75, m
 def batch_of(count, seed=0):
     rng = torch.Generator().manual_seed(seed)
     points = 0.3 * (torch.rand(count, 40, 3, generator=rng) - 0.5)
-    truth = ImageTruth(*torch.rand(2, count, 2, HEIGHT, WIDTH, generator=rng))
+    pairs = random_pairs(count, seed)
+    images_2B2HW = torch.rand(2, count, 2, HEIGHT, WIDTH, generator=rng)
+    truth = ImageTruth(*images_2B2HW, pairs.camera_from_rig_B244[..., 2, 3])
     ids = [ViewId("mug", f"m{index}", 0) for index in range(count)]
-    return Batch(
-        random_pairs(count, seed), {"train": Queries(points, (points[..., 0] > 0).float())}, ids, truth
-    )
+    return Batch(pairs, {"train": Queries(points, (points[..., 0] > 0).float())}, ids, truth)
 
 
 def pixels_of(batch):
@@ -45,7 +45,7 @@ def drawn(batch):
     squares = (torch.stack([u, v], dim=-1) - pixels_B22[:, :, None, None]).square().sum(dim=-1)
     spots_B2HW = torch.exp(-squares / (2 * 2.0**2))
     left, right = spots_B2HW[:, :, None].expand(-1, -1, 3, -1, -1).unbind(1)
-    truth = ImageTruth(spots_B2HW, 1.0 + spots_B2HW)
+    truth = replace(batch.truth, mask_B2HW=spots_B2HW, depth_B2HW=1.0 + spots_B2HW)
     return replace(batch, views=replace(batch.views, left_BCHW=left, right_BCHW=right), truth=truth)
 
 
@@ -92,6 +92,7 @@ def test_cameras_stay_cameras_and_labels_stay_with_their_points(turn):
     distances = [batch.queries["train"].points_BN3.norm(dim=-1) for batch in (before, after)]
     torch.testing.assert_close(*distances)
     assert after.ids == before.ids
+    torch.testing.assert_close(after.truth.origin_B2, after.views.camera_from_rig_B244[..., 2, 3])
 
 
 def test_depths_along_the_axes_are_kept():

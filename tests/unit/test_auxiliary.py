@@ -31,7 +31,7 @@ def batch_of(mask_B2HW, depth_B2HW):
         extrinsics.repeat(count, 1, 1, 1),
     )
     ids = [ViewId("mug", "m", index) for index in range(count)]
-    return Batch(views, {}, ids, ImageTruth(mask_B2HW, depth_B2HW))
+    return Batch(views, {}, ids, ImageTruth(mask_B2HW, depth_B2HW, views.camera_from_rig_B244[:, :, 2, 3]))
 
 
 @pytest.fixture

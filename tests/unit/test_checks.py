@@ -104,7 +104,7 @@ def four_cores(monkeypatch):
         ("augmentation.mirror=2", "augmentation.mirror=2.0: must be between 0 and 1"),
         (
             "augmentation.roll_deg=5",
-            "augmentation.roll_deg=5.0: model=stereo does not read the cameras that roll; say augmentation.roll_deg=0",
+            "augmentation.roll_deg=5.0: model=stereo has no way to know how its cameras have rolled; say augment",
         ),
         ("auxiliary.depth=-1", "auxiliary.depth=-1.0: must be at least 0"),
         ("averaging.decay=1", "averaging.decay=1.0: must be at least 0 and below 1, or null"),
@@ -171,6 +171,27 @@ def test_the_disparities_of_one_rig_are_not_those_of_many(model, volume):
     )
     advised = [problem.rpartition("; say ")[2].partition(",")[0]]
     assert find_problems("train", ["model=stereo", *advised, "rig=randomised"], check_training) == []
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ["model=stereo", "model/cost_volume=plane_sweep"],  # about the left camera, whatever its roll
+        ["model=plane_sweep_stereo", "rig=rectified", "placement=table"],
+    ],
+)
+def test_pictures_are_not_rolled_where_the_labels_would_not_follow(overrides):
+    (problem,) = find_problems("train", [*overrides, "augmentation=full"], check_training)
+    assert problem.startswith("augmentation.roll_deg=10.0: ")
+    unrolled = [*overrides, "augmentation=full", "augmentation.roll_deg=0"]
+    assert find_problems("train", unrolled, check_training) == []
+
+
+def test_places_in_a_map_need_an_image_of_whole_cells():
+    resnet = ["model/encoder=resnet18_scratch", "scale.image_side=66"]
+    (problem,) = find_problems("train", ["model=pixel_stereo", *resnet], check_training)
+    assert problem.startswith("data.image_side: model.encoder=resnet18 takes multiples of 4 pixels, got 66")
+    assert find_problems("train", ["model=mono_scratch", "scale.image_side=66"], check_training) == []
 
 
 def test_a_mesh_folder_must_exist(tmp_path):

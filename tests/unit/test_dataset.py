@@ -154,6 +154,8 @@ def test_shuffled_right_images_are_another_objects_whoever_is_in_the_batch(shard
             np.testing.assert_allclose(left.permute(1, 2, 0) * 255, own.rgb(name.view)[0], atol=1e-4)
             np.testing.assert_allclose(batch.truth.depth_B2HW[place, 0], own.depth(name.view)[0])
             np.testing.assert_allclose(batch.truth.depth_B2HW[place, 1], source.depth(name.view)[1])
+            origins = [shard.cameras(name.view)[1][i, 2, 3] for i, shard in enumerate((own, source))]
+            np.testing.assert_allclose(batch.truth.origin_B2[place], origins)
             np.testing.assert_allclose(batch.views.K_B233[place], own.cameras(name.view)[0], rtol=1e-6)
 
 

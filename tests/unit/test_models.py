@@ -286,3 +286,12 @@ def test_points_answered_in_pieces_get_the_answer_they_get_at_once(count):
     code, points_BN3 = torch.randn(2, 512), torch.rand(2, count, 3) - 0.5
     with torch.inference_mode():
         torch.testing.assert_close(model.decode_all(code, points_BN3), model.decode(code, points_BN3))
+
+
+@pytest.mark.parametrize(
+    "overrides", [["model=stereo"], ["model=pixel_stereo"], ["model=plane_sweep_guided"]], ids=str
+)
+def test_no_points_have_no_answers(overrides):
+    model = build(*overrides).eval()
+    with torch.no_grad():
+        assert model.decode_all(model.encode(random_views(1)), torch.zeros(1, 0, 3)).shape == (1, 0)

@@ -9,7 +9,7 @@ from stereo_occ.geometry.pose import Pose
 from stereo_occ.geometry.rotations import random_rotations
 from stereo_occ.occupancy.contains import contains
 from stereo_occ.occupancy.pools import box_pool, surface_pool
-from stereo_occ.occupancy.queries import bbox_queries, cube_queries, outside_queries, surface_queries
+from stereo_occ.occupancy.queries import cube_queries, outside_queries, pool_queries
 from stereo_occ.shapes.shape import Shape
 
 
@@ -40,7 +40,7 @@ def box_of(pose, points_N3):
 def test_truth_as_prediction_has_iou_1_under_any_pose(pose):
     posed = SHAPE.mesh.copy().apply_transform(pose.rig_from_object)
     rng = np.random.default_rng(2)
-    for queries in (bbox_queries(POOL, pose, 3000, rng), cube_queries(POOL, pose, 20_000, rng)):
+    for queries in (pool_queries(POOL, pose, 3000, rng), cube_queries(POOL, pose, 20_000, rng)):
         predicted_N = contains(posed, queries.points_N3)
         score = iou(torch.tensor(predicted_N)[None], torch.tensor(queries.occupied_N)[None])
         assert queries.occupied_N.sum() > 100
@@ -51,7 +51,7 @@ def test_points_left_in_the_object_frame_score_far_less():
     rng = np.random.default_rng(3)
     for pose in poses():
         posed = SHAPE.mesh.copy().apply_transform(pose.rig_from_object)
-        queries = bbox_queries(POOL, pose, 3000, rng)
+        queries = pool_queries(POOL, pose, 3000, rng)
         predicted_N = contains(posed, pose.to_object(queries.points_N3))
         assert float(iou(torch.tensor(predicted_N)[None], torch.tensor(queries.occupied_N)[None])) < 0.8
 
@@ -101,22 +101,22 @@ def test_outside_queries_are_uniform_outside_the_box(pose):
     assert abs(chi2 - free.sum()) < 4.5 * np.sqrt(2 * free.sum())
 
 
-def test_bbox_queries_are_distinct_and_random():
+def test_queries_of_a_pool_are_distinct_and_random():
     pose = poses()[0]
-    queries = bbox_queries(POOL, pose, len(POOL), np.random.default_rng(7))
+    queries = pool_queries(POOL, pose, len(POOL), np.random.default_rng(7))
     assert len(np.unique(queries.points_N3.round(6), axis=0)) > len(POOL) - 5
     assert queries.occupied_N.sum() == POOL.occupied_N.sum()
-    again = bbox_queries(POOL, pose, 100, np.random.default_rng(7))
-    other = bbox_queries(POOL, pose, 100, np.random.default_rng(8))
+    again = pool_queries(POOL, pose, 100, np.random.default_rng(7))
+    other = pool_queries(POOL, pose, 100, np.random.default_rng(8))
     np.testing.assert_array_equal(
-        again.points_N3, bbox_queries(POOL, pose, 100, np.random.default_rng(7)).points_N3
+        again.points_N3, pool_queries(POOL, pose, 100, np.random.default_rng(7)).points_N3
     )
     assert (again.points_N3 != other.points_N3).any()
 
 
 def test_surface_queries_are_close_to_the_posed_surface():
     pool, pose = surface_pool(SHAPE, 2000, np.random.default_rng(9), sigmas=(0.01,)), poses()[5]
-    queries = surface_queries(pool, pose, 300, np.random.default_rng(10))
+    queries = pool_queries(pool, pose, 300, np.random.default_rng(10))
     posed = SHAPE.mesh.copy().apply_transform(pose.rig_from_object)
     surface_N3, _ = trimesh.sample.sample_surface(posed, 20_000, seed=0)
     distance_N = np.linalg.norm(queries.points_N3[:, None] - surface_N3[None], axis=-1).min(axis=1)
@@ -127,7 +127,7 @@ def test_surface_queries_are_close_to_the_posed_surface():
 
 def test_a_pool_that_is_too_small_says_so():
     with pytest.raises(UserError, match="30001 asked from a pool of 30000"):
-        bbox_queries(POOL, poses()[0], 30_001, np.random.default_rng(0))
+        pool_queries(POOL, poses()[0], 30_001, np.random.default_rng(0))
     small = box_pool(SHAPE, 100, np.random.default_rng(0))
     with pytest.raises(UserError, match="from a pool of 100"):
         cube_queries(small, poses()[0], 10_000, np.random.default_rng(0))
