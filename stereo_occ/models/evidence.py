@@ -88,7 +88,8 @@ def add_linear(sum_ABCN: Tensor, weight_CD: Tensor, x_ABDN: Tensor) -> Tensor:
 
 def groupwise_correlation(left_BCN: Tensor, right_BCN: Tensor, groups: int) -> Tensor:
     """Products of features averaged over each group of channels, ``(B, groups, N)``."""
-    return (left_BCN * right_BCN).unflatten(1, (groups, -1)).mean(dim=2)
+    B, C, N = left_BCN.shape
+    return (left_BCN * right_BCN).view(B, groups, C // groups, N).mean(dim=2)
 
 
 def positional_encoding(points_BN3: Tensor, frequencies: int) -> Tensor:

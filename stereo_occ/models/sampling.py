@@ -64,7 +64,7 @@ def sample_maps(features_VBCHW: Tensor, positions_VBN2: Tensor) -> Tensor:
         padding_mode="border",
         align_corners=False,
     )
-    return samples_MCN1.squeeze(3).unflatten(0, (V, B)).to(features_VBCHW.dtype)
+    return samples_MCN1.view(V, B, samples_MCN1.shape[1], N).to(features_VBCHW.dtype)
 
 
 def cell_centers(cells: int) -> Tensor:
