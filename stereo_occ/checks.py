@@ -187,8 +187,9 @@ def _split(cfg: DictConfig) -> Iterator[str]:
     if min(data.fractions[:2]) == 0:
         yield f"data.fractions={data.fractions}: training needs a share for train and one for val"
     elif data.split is SplitKind.view:
-        yield from _refusal(subset_sizes, data.views, data.fractions, "data.views")
-        if data.views >= 3 and cfg.validation.views > len(split_views(data.views, data.fractions, "val")):
+        refused = list(_refusal(subset_sizes, data.views, data.fractions, "data.views"))
+        yield from refused
+        if not refused and cfg.validation.views > len(split_views(data.views, data.fractions, "val")):
             yield f"validation.views={cfg.validation.views}: data.split=view leaves fewer of data.views={data.views}"
     elif data.name == "procedural":
         for name in cfg.categories.names:
@@ -221,6 +222,11 @@ def _schedule(cfg: DictConfig) -> Iterator[str]:
         yield (
             f"steps={cfg.steps}: is not a multiple of validation.interval={interval}, so the last state would not be "
             f"validated; say steps={whole} validation.interval={interval}"
+        )
+    if cfg.scheduler.warmup > cfg.steps:
+        yield (
+            f"scheduler.warmup={cfg.scheduler.warmup}: is longer than steps={cfg.steps}, so the learning rate would "
+            f"never be optimizer.lr; warm up for fewer steps"
         )
     if cfg.validation.views > cfg.data.views:
         yield f"validation.views={cfg.validation.views}: there are only data.views={cfg.data.views} per object"

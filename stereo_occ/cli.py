@@ -7,7 +7,7 @@ import sys
 import warnings
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -20,11 +20,12 @@ from omegaconf.errors import InterpolationKeyError
 
 from stereo_occ.config import register_schemas
 from stereo_occ.errors import UserError
+from stereo_occ.group import is_first
 from stereo_occ.models.extension import load_extensions
 from stereo_occ.paths import conf_dir
 from stereo_occ.printable import printable
 from stereo_occ.problems import Check, find_problems
-from stereo_occ.run_folder import remove_traces
+from stereo_occ.run_folder import claimed, remove_traces
 from stereo_occ.system_errors import one_line
 from stereo_occ.watched_output import watched_output
 
@@ -68,12 +69,13 @@ def entry_point(
         @functools.wraps(task)
         def guarded(cfg: DictConfig) -> object:
             register_schemas()  # a launcher's process does not know them yet
+            folder = Path(HydraConfig.get().runtime.output_dir)
             try:
-                load_extensions()
-                return task(cfg)
+                with claimed(folder) if is_first() else nullcontext(), _traces_removed(folder):
+                    load_extensions()
+                    return task(cfg)
             except Exception as error:
                 problem = one_line(error)
-                remove_traces(Path(HydraConfig.get().runtime.output_dir))
                 if _runs_elsewhere():
                     raise UserError(problem) from error  # Hydra brings it back to the process of the sweep
                 refuse(problem)
@@ -116,6 +118,16 @@ def entry_point(
         return main
 
     return decorate
+
+
+@contextmanager
+def _traces_removed(folder: Path) -> Iterator[None]:
+    """Where what is done in the context fails, remove the run folder that it has left nothing in."""
+    try:
+        yield
+    except Exception:
+        remove_traces(folder)
+        raise
 
 
 def compose_config(config_name: str, overrides: Sequence[str] = ()) -> DictConfig:

@@ -95,7 +95,8 @@ def find_problems(
                 problems.append(f"{override}: a key cannot be removed; give it a value instead")
                 continue
             try:
-                choices = _choices(OverridesParser.create().parse_override(override))
+                (parsed,) = OverridesParser.create(loader).parse_overrides([override])
+                choices = _choices(parsed)
             except (HydraException, ValueError):  # ValueError: thousands of digits
                 choices = []
             if not choices or not _key(override):

@@ -7,7 +7,7 @@ from typing import Any, BinaryIO, cast
 import torch
 from lightning.fabric.plugins import TorchCheckpointIO
 from lightning.pytorch import LightningModule, Trainer
-from lightning.pytorch.callbacks import Checkpoint
+from lightning.pytorch.callbacks import Checkpoint, ModelCheckpoint
 
 from stereo_occ.checkpoint import KEY, config_of, plain, read_checkpoint
 from stereo_occ.errors import UserError
@@ -51,6 +51,28 @@ class SaveLatest(Checkpoint):
             self.step = trainer.global_step
 
 
+class SaveBest(ModelCheckpoint):
+    """Keeps the state of the best validation beside the latest, also where their folder has been moved."""
+
+    @property
+    def state_key(self) -> str:
+        """Lightning's own."""
+        return super().state_key.replace(type(self).__qualname__, ModelCheckpoint.__qualname__, 1)
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Know of the best state in this folder; Lightning forgets it where the folder had another name."""
+        best = Path(str(self.dirpath)) / Path(state_dict["best_model_path"]).name
+        if best.is_file():
+            path, score = str(best), state_dict["best_model_score"]
+            state_dict = state_dict | {
+                "dirpath": self.dirpath,
+                "best_model_path": path,
+                "kth_best_model_path": path,
+                "best_k_models": {path: score},
+            }
+        super().load_state_dict(state_dict)
+
+
 class AtomicCheckpoints(TorchCheckpointIO):
     """Writes a checkpoint beside its place and moves it there when it is whole, within one file system."""
 
@@ -92,10 +114,18 @@ class _Noting:
 
 
 def _fixed(config: Mapping[str, Any]) -> dict[str, Any]:
-    """What must not change, by its name; a schedule's warm-up follows the run's length, which may."""
+    """What must not change, by its name; a schedule's warm-up follows the run's length, which may.
+
+    Of files it is what they hold, which is compared for itself, and not where they are or how long they may be read.
+    """
+    data = {
+        key: value
+        for key, value in config["data"].items()
+        if key not in ("root", "time_limit", "memory_limit")
+    }
     scheduler = {key: value for key, value in config["scheduler"].items() if key != "warmup"}
     rest = {"scheduler": scheduler, "validation.decision": config["validation"]["decision"]}
-    return {name: config[name] for name in FIXED} | rest
+    return {name: config[name] for name in FIXED} | {"data": data} | rest
 
 
 def step_to_resume(checkpoint: Path, config: dict[str, Any], objects: Mapping[str, list[str]]) -> int:
@@ -131,4 +161,10 @@ def step_to_resume(checkpoint: Path, config: dict[str, Any], objects: Mapping[st
             f"{checkpoint}: holds weights alone and no state to go on from; say resume=never init=FILE to begin with "
             f"them"
         )
-    return int(saved["global_step"])
+    step = int(saved["global_step"])
+    if step > config["steps"]:
+        raise UserError(
+            f"steps={config['steps']}: the run in {checkpoint.parent} has {step} already; ask for as many or more, or "
+            f"choose another hydra.run.dir, or resume=never to start over"
+        )
+    return step

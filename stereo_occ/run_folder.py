@@ -1,11 +1,43 @@
 """What a run folder holds of its command, and what is removed where a command did nothing."""
 
+import fcntl
+import os
 import shutil
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from stereo_occ.errors import UserError
 
 #: The overrides of a training's command line.
 OVERRIDES = "overrides.yaml"
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Let no other process run in a folder that is no working directory, as long as the context lasts.
+
+    Where the system knows no locks of folders, as on some network drives, it is not kept from it.
+
+    Raises:
+        UserError: another process has claimed the folder.
+    """
+    if folder.resolve() == Path.cwd() or not folder.is_dir():
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise UserError(
+                    f"hydra.run.dir={folder}: another process is running in this folder; wait for it, or give "
+                    f"another folder"
+                ) from error
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def remove_traces(folder: Path) -> None:

@@ -1,5 +1,6 @@
 """``python -m stereo_occ.train``: render what is missing, train, validate, write the run folder."""
 
+import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,10 +28,12 @@ from stereo_occ.memory import keep_freed_memory
 from stereo_occ.metrics_file import WriteMetrics, best_iou
 from stereo_occ.precision import chosen_precision
 from stereo_occ.quiet import quiet_libraries
-from stereo_occ.resume import AtomicCheckpoints, SaveLatest, step_to_resume
+from stereo_occ.resume import AtomicCheckpoints, SaveBest, SaveLatest, step_to_resume
 from stereo_occ.run_folder import OVERRIDES
 from stereo_occ.trained import begin_with
 from stereo_occ.writing import write_whole
+
+logger = logging.getLogger(__name__)
 
 METRICS_FILE = "metrics.json"
 
@@ -51,6 +54,11 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
     resume = typed.resume is Resume.auto and latest.exists()
     objects = list_objects(typed, typed.progress and is_first())
     identities = training_objects(objects.sources, typed)
+    if objects.skipped and is_first():
+        logger.warning(
+            "%d mesh files or folders are left out; python -m stereo_occ.inspect with the same data says why",
+            len(objects.skipped),
+        )
     step = step_to_resume(latest, plain(cfg), identities) if resume else 0
     lightning.seed_everything(typed.seed, verbose=False)
     task = build_task(cfg, load_weights=not resume and typed.init is None, objects=identities)
@@ -72,9 +80,10 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
     except (
         SystemExit
     ) as stop:  # how Lightning ends after Ctrl-C (code 1) or SIGTERM (code 0, as if it were done)
+        command = "the same command" + (" without resume=never" if typed.resume is Resume.never else "")
         sys.stderr.write(
             f"stereo_occ: stopped after step {trainer.global_step} of {typed.steps}; "
-            f"the same command with hydra.run.dir={folder} goes on from step {kept.step}\n"
+            f"{command} with hydra.run.dir={folder} goes on from step {kept.step}\n"
         )
         raise SystemExit(143 if isinstance(stop, SIGTERMException) else 130) from stop
     return trainer
@@ -118,30 +127,20 @@ def build_callbacks(
 ) -> list[Callback]:
     """Checkpoints (the best, and ``kept``), metrics file, pictures, progress bar."""
     validation = typed.validation
+    named = {"monitor": "val/iou", "auto_insert_metric_name": False, "enable_version_counter": False}
+    states: list[Callback] = [SaveBest(folder, filename="best", mode="max", **named)]
+    if validation.keep_all:
+        states.append(
+            ModelCheckpoint(
+                folder, filename="step_{step:06d}", save_top_k=-1, save_weights_only=True, **named
+            )
+        )
     callbacks: list[Callback] = [
         StopIfDiverged(typed.logger.interval, validation.interval),
-        ModelCheckpoint(
-            folder,
-            filename="best",
-            monitor="val/iou",
-            mode="max",
-            auto_insert_metric_name=False,
-            enable_version_counter=False,
-        ),
+        *states,
         kept,
         WriteMetrics(folder / METRICS_FILE),
     ]
-    if validation.keep_all:
-        callbacks.append(
-            ModelCheckpoint(
-                folder,
-                filename="step_{step:06d}",
-                monitor="val/iou",
-                save_top_k=-1,
-                save_weights_only=True,
-                auto_insert_metric_name=False,
-            )
-        )
     if boards:
         callbacks += [
             Show(typed.logger, boards, plain(cfg)),

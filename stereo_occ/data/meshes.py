@@ -95,10 +95,13 @@ def inspect_files(
 
 
 def without_copies(records: Sequence[MeshRecord]) -> Iterator[MeshRecord]:
-    """The records, those rejected that hold the same solid as one before them: a copy must not be in two subsets."""
+    """The records, those rejected that hold the same solid as one before them, in whatever colours.
+
+    A solid must not be in two subsets.
+    """
     first: dict[str, MeshFile] = {}
     for record in records:
-        original = first.setdefault(record.outcome.checksum or str(record.file.path), record.file)
+        original = first.setdefault(record.outcome.solid or str(record.file.path), record.file)
         if original is record.file or record.outcome.reason:
             yield record
         else:

@@ -23,6 +23,7 @@ class ObjectSource:
 
     Attributes:
         version: differs when a file of the same name holds another mesh; empty for a generated object.
+        solid: of a mesh, the same for the same one in other colours.
         seed: of a generated object.
         subset: that the data set itself puts the object in; empty where it says nothing.
     """
@@ -31,6 +32,7 @@ class ObjectSource:
     object_id: str
     build: Callable[[], Shape]
     version: str = ""
+    solid: str = ""
     subset: str = ""
     seed: int = 0
 
@@ -46,8 +48,8 @@ class ObjectSource:
 
     @property
     def identity(self) -> str:
-        """The same for one shape in all data sets: what a mesh file holds; seed and name of a generated object."""
-        return self.version or f"{self.seed}/{self.category}/{self.object_id}"
+        """The same for one shape in all data sets: the solid of a mesh file; seed and name of a generated object."""
+        return self.solid or f"{self.seed}/{self.category}/{self.object_id}"
 
 
 @dataclass(frozen=True)
@@ -105,8 +107,9 @@ def list_objects(pairs: PairsConfig, progress: bool) -> Objects:
             record.file.category,
             record.file.object_id,
             record.shape,
-            f"_{record.outcome.checksum}",
-            record.file.subset,
+            version=f"_{record.outcome.checksum}",
+            solid=f"_{record.outcome.solid}",
+            subset=record.file.subset,
         )
         for record in records
         if not record.outcome.reason

@@ -28,6 +28,7 @@ SHA-256 of the whole file (:func:`checksum_path`), as ``sha256sum`` writes it.
 import json
 from dataclasses import dataclass
 from functools import cached_property
+from os import strerror
 from pathlib import Path
 from typing import Any, Self
 
@@ -42,6 +43,7 @@ from stereo_occ.data.shard_arrays import DAMAGED, array_of
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.pose import Pose
 from stereo_occ.occupancy.pools import PointPool
+from stereo_occ.system_errors import REMEDIES
 
 FORMAT = "stereo_occ.shard"
 VERSION = 1
@@ -80,6 +82,7 @@ class Shard:
 
     @cached_property
     def _file(self) -> h5py.File:
+        use(self)
         try:
             file = h5py.File(self.path, "r", rdcc_nbytes=0)
             form, version = _text(file.attrs.get("format")), file.attrs.get("version")
@@ -93,6 +96,8 @@ class Shard:
         return file
 
     def _damaged(self, error: Exception) -> UserError:
+        if isinstance(error, OSError) and error.errno in REMEDIES:  # the shard may be as it should
+            return UserError(f"{self.path}: {strerror(error.errno)}; {REMEDIES[error.errno]}")
         reason = " ".join(str(error).split())
         return UserError(f"{self.path}: cannot read the shard ({reason}); delete it and render again")
 

@@ -2,10 +2,7 @@
 
 import hashlib
 import json
-import os
-import socket
 from collections.abc import Mapping
-from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -19,7 +16,7 @@ from stereo_occ.data.shard import FORMAT, VERSION, Views, checksum_path
 from stereo_occ.errors import UserError
 from stereo_occ.occupancy.pools import PointPool
 from stereo_occ.shapes.shape import Shape
-from stereo_occ.writing import partial_path
+from stereo_occ.writing import whole_file
 
 POINTS_PER_CHUNK = 8192
 
@@ -35,29 +32,16 @@ def write_shard(path: Path, shape: Shape, views: Views, pools: Mapping[str, Poin
     """
     image = _file_image(shape, views, pools)
     checksum = f"{hashlib.sha256(image).hexdigest()}  {path.name}\n".encode()
-    contents: dict[Path, bytes | memoryview] = {path: image, checksum_path(path): checksum}
-    partial = {target: partial_path(target, socket.gethostname(), os.getpid()) for target in contents}
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        for target, content in contents.items():
-            _write_to_disk(partial[target], content)
-        for target in reversed(contents):  # no shard without its checksum
-            partial[target].replace(target)
+        # The inner file is there first: no shard without its checksum.
+        with whole_file(path) as shard_file, whole_file(checksum_path(path)) as checksum_file:
+            shard_file.write(image)
+            shard_file.flush()
+            checksum_file.write(checksum)
     except OSError as error:
         raise UserError(
             f"{path}: cannot write the shard ({error}); free some disk space or set paths.data"
         ) from error
-    finally:
-        with suppress(NotADirectoryError):
-            for file in partial.values():
-                file.unlink(missing_ok=True)
-
-
-def _write_to_disk(path: Path, content: bytes | memoryview) -> None:
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
 
 
 def _file_image(shape: Shape, views: Views, pools: Mapping[str, PointPool]) -> memoryview:

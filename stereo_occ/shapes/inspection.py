@@ -27,6 +27,7 @@ class Inspection:
         measures: figures of the repair by name.
         reason: why the file was rejected, in one line; empty if it was not.
         checksum: eight characters that change with mesh and colours; empty if the file cannot be read.
+        solid: the same of the mesh alone.
         side_files: SHA-256 of the other files it refers to, see :class:`~stereo_occ.shapes.reading.RawMesh`.
     """
 
@@ -36,6 +37,7 @@ class Inspection:
     measures: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
     checksum: str = ""
+    solid: str = ""
     side_files: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -73,14 +75,21 @@ def inspect_mesh(path: Path, root: Path, colors: bool) -> Inspection:
     try:
         repaired = repair(raw.mesh)
     except UserError as error:
+        checksum = _checksum(raw.mesh)
         return Inspection(
-            raw.mesh, reason=str(error), checksum=_checksum(raw.mesh, None), side_files=raw.side_files
+            raw.mesh, reason=str(error), checksum=checksum, solid=checksum, side_files=raw.side_files
         )
     mesh = repaired.mesh
     own = None if raw.colors is None else raw.colors.at(mesh.vertices)
     measures = {name: float(value) for name, value in repaired.measures.items()}
     return Inspection(
-        mesh, own, repaired.steps, measures, checksum=_checksum(mesh, own), side_files=raw.side_files
+        mesh,
+        own,
+        repaired.steps,
+        measures,
+        checksum=_checksum(mesh, own),
+        solid=_checksum(mesh),
+        side_files=raw.side_files,
     )
 
 
@@ -93,6 +102,6 @@ def file_from_object(mesh: Trimesh) -> NDArray[np.float64]:
     return matrix
 
 
-def _checksum(mesh: Trimesh, colors: NDArray[np.uint8] | None) -> str:
+def _checksum(mesh: Trimesh, colors: NDArray[np.uint8] | None = None) -> str:
     value = crc32(mesh.vertices.tobytes() + mesh.faces.tobytes())
     return f"{value if colors is None else crc32(colors.tobytes(), value):08x}"

@@ -1,11 +1,13 @@
 """Inspected meshes kept on disk: a file is repaired once for all data sets, resolutions and runs.
 
 An entry is named by the content of the file and by the code that reads and repairs it, so that neither a changed file
-nor a changed repair meets an old result. It appears under its name only when it is whole.
+nor a changed repair meets an old result; where the file may refer to others, which differ from folder to folder, by its
+place in the data set too. It appears under its name only when it is whole.
 """
 
 import hashlib
 import json
+import os
 import zipfile
 from functools import cache
 from importlib.metadata import version
@@ -25,6 +27,10 @@ from stereo_occ.writing import whole_file
 
 #: What reading an entry raises that is not there or not whole.
 DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
+
+
+#: Of files that are all there is of a mesh.
+ALONE = (".off", ".stl")
 
 
 class MeshCache:
@@ -70,7 +76,9 @@ class MeshCache:
             content = b"" if fault_of(path) else path.read_bytes()
         except OSError:
             content = b""
-        key.update(content or str(path).encode(errors="surrogateescape"))
+        if path.suffix.lower() not in ALONE:
+            key.update(os.fsencode(os.path.relpath(path, self.root)) + b"\0")
+        key.update(content or os.fsencode(path))
         return self.folder / f"{key.hexdigest()[:32]}.npz"
 
 
@@ -86,6 +94,7 @@ def save(inspection: Inspection, entry: Path) -> None:
         "measures": dict(inspection.measures),
         "reason": inspection.reason,
         "checksum": inspection.checksum,
+        "solid": inspection.solid,
         "side_files": dict(inspection.side_files),
     }
     content = BytesIO()

@@ -116,8 +116,10 @@ def test_training_without_objects_is_one_line(root, data_folder, test_shards, tm
 def test_the_commands_report_on_every_mesh(root, tmp_path):
     """A folder with a good, an open, a flat and a broken mesh: inspected, and rendered without the bad ones."""
     folder = tmp_path / "meshes"
-    put(box(1, 1, 2), folder, "mug/good.stl")
-    put(box(1, 1, 2), folder, "mug/same.stl")
+    put(box(1, 1, 2), folder, "mug/good.ply")
+    painted = box(1, 1, 2)
+    painted.visual.vertex_colors = [200, 30, 30, 255]
+    put(painted, folder, "mug/same.ply")
     lidless = box(1, 2, 1)
     lidless.update_faces(np.arange(12) > 0)
     put(lidless, folder, "bowl/open.ply")
@@ -136,11 +138,11 @@ def test_the_commands_report_on_every_mesh(root, tmp_path):
             rows = {row["file"]: row for row in csv.DictReader(file)}
         assert {name: row["status"] for name, row in rows.items()} == {
             "bowl/flat.ply": "rejected", "bowl/noise.glb": "rejected", "bowl/open.ply": "repaired",
-            "mug/good.stl": "clean", "mug/same.stl": "rejected",
+            "mug/good.ply": "clean", "mug/same.ply": "rejected",
         }  # fmt: skip
-        assert rows["mug/same.stl"]["reason"] == "is a copy of mug/good"
+        assert rows["mug/same.ply"]["reason"] == "is a copy of mug/good"
         assert rows["bowl/noise.glb"]["reason"].startswith("cannot be read")
-        assert float(rows["mug/good.stl"]["wall_median"]) > 0.3
+        assert float(rows["mug/good.ply"]["wall_median"]) > 0.3
         with Image.open(report / "quality.png") as sheet:
             assert len(np.unique(np.asarray(sheet.convert("RGB")).reshape(-1, 3), axis=0)) > 20
     # the table can be given back, with the subsets filled in

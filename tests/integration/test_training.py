@@ -16,6 +16,7 @@ from stereo_occ import train as train_module
 from stereo_occ.checkpoint import KEY, plain, read_checkpoint
 from stereo_occ.cli import compose_config
 from stereo_occ.errors import UserError
+from stereo_occ.task import OccupancyTask
 
 STEPS, INTERVAL, SAVES = 12, 6, 3
 
@@ -317,6 +318,28 @@ def test_a_killed_process_goes_on(workshop, run, tmp_path, name, code, step):
     assert curves(folder)["train/loss"] == list(range(1, STEPS + 1))
 
 
+def test_a_run_that_was_moved_keeps_its_best_state(workshop, monkeypatch, tmp_path):
+    """Its last validation is worse: after the first it learns the opposite of the labels."""
+    learn = OccupancyTask.training_step
+
+    def unlearn(task, batch, index):
+        loss = learn(task, batch, index)
+        return loss if task.global_step < INTERVAL else -loss
+
+    monkeypatch.setattr(OccupancyTask, "training_step", unlearn)
+    folder = stopped(workshop, monkeypatch, tmp_path / "here", 9, "logger=none")
+    moved = folder.rename(tmp_path / "there")
+    workshop.train(moved, "logger=none")
+    first, last = history(moved)
+    assert last["val/iou"] < first["val/iou"]
+    assert read_checkpoint(moved / "best.ckpt")["global_step"] == first["step"] == INTERVAL
+
+
+def test_a_run_does_not_become_shorter(workshop, run):
+    with pytest.raises(UserError, match=r"^steps=6: the run in .* has 12 already; ask for as many or more"):
+        workshop.train(run, "steps=6")
+
+
 def test_a_finished_run_is_left_as_it_is(workshop, run, tmp_path):
     folder = workshop.train(tmp_path / "run")
     before = {name: (folder / name).read_bytes() for name in ("best.ckpt", "last.ckpt", "metrics.json")}
@@ -433,6 +456,9 @@ def test_every_validation_can_be_kept(workshop, tmp_path):
     kept = sorted(path.name for path in folder.glob("step_*.ckpt"))
     assert kept == ["step_000006.ckpt", "step_000012.ckpt"]
     assert read_checkpoint(folder / kept[0])[KEY]["config"]["steps"] == STEPS
+    workshop.train(folder, "logger=none", "validation.keep_all=true", "resume=never", "seed=1")
+    assert kept == sorted(path.name for path in folder.glob("step_*.ckpt"))
+    assert {read_checkpoint(folder / name)[KEY]["config"]["seed"] for name in kept} == {1}
 
 
 def test_nothing_is_said_on_the_terminal(workshop, tmp_path):

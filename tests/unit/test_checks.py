@@ -52,6 +52,14 @@ def four_cores(monkeypatch):
         ("data.fractions=[1,0,0]", "data.fractions=[1.0, 0.0, 0.0]: training needs"),
         ("data.split=view data.views=2 validation.views=1", "data.views: 2 are too few to divide"),
         (
+            "data.split=view data.fractions=[0.5,0.5,0] data.views=2 validation.views=2",
+            "validation.views=2: data.split=view leaves fewer of data.views=2",
+        ),
+        (
+            "scheduler.warmup=100000",
+            "scheduler.warmup=100000: is longer than steps=40000, so the learning rate would never be",
+        ),
+        (
             "data.split=view data.views=20",
             "validation.views=4: data.split=view leaves fewer of data.views=20",
         ),

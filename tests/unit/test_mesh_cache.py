@@ -30,7 +30,7 @@ def test_an_entry_says_what_inspecting_said(tmp_path, cache):
     np.testing.assert_array_equal(found.mesh.vertices, made.mesh.vertices)
     np.testing.assert_array_equal(found.mesh.faces, made.mesh.faces)
     np.testing.assert_array_equal(found.colors, made.colors)
-    for name in ("steps", "measures", "reason", "checksum", "side_files", "status"):
+    for name in ("steps", "measures", "reason", "checksum", "solid", "side_files", "status"):
         assert getattr(found, name) == getattr(made, name)
     assert load(entry, header_only=True).mesh is None
 
@@ -52,6 +52,17 @@ def test_the_same_file_elsewhere_is_known_and_a_changed_one_is_not(tmp_path, cac
     put(box(1, 2, 4), tmp_path, "mug/a/model.stl")
     assert cache.find(path) is None
     assert cache.find(tmp_path / "mug" / "a" / "absent.stl") is None
+
+
+def test_the_same_file_beside_other_materials_is_another(tmp_path, cache):
+    for color, values in (("red", "1 0 0"), ("blue", "0 0 1")):
+        folder = tmp_path / "mug" / color
+        folder.mkdir(parents=True)
+        (folder / "model.obj").write_text("mtllib m.mtl\nusemtl m\n" + box(1, 1, 1).export(file_type="obj"))
+        (folder / "m.mtl").write_text(f"newmtl m\nKd {values}\n")
+        cache.make(folder / "model.obj")
+    colors = [load(cache.find(tmp_path / "mug" / color / "model.obj")).colors[0] for color in ("red", "blue")]
+    np.testing.assert_array_equal(colors, [[255, 0, 0], [0, 0, 255]])
 
 
 def test_changed_materials_are_noticed(tmp_path, cache):
@@ -109,6 +120,7 @@ def test_the_checksum_tells_colours_apart(tmp_path):
     colored = inspect_mesh(put(mesh, tmp_path, "a.ply"), tmp_path, colors=True)
     assert plain.checksum != colored.checksum
     assert plain.checksum == inspect_mesh(tmp_path / "a.ply", tmp_path, colors=False).checksum
+    assert plain.solid == colored.solid == plain.checksum
 
 
 def test_status():

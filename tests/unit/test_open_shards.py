@@ -1,11 +1,14 @@
 """More shards than can be open at once."""
 
+import errno
 import gc
 import resource
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
+import h5py
 import numpy as np
 import pytest
 from samples import small_shard
@@ -13,6 +16,7 @@ from samples import small_shard
 from stereo_occ.data import open_shards
 from stereo_occ.data.open_shards import forget, most_open, use
 from stereo_occ.data.shard import Shard
+from stereo_occ.errors import UserError
 
 
 @pytest.fixture(autouse=True)
@@ -66,6 +70,20 @@ def test_a_closed_shard_opens_again_with_the_same_content(tmp_path):
         again = (shard.object_id, shard.rgb(0), shard.pose(0).rig_from_object, shard.pool("box").grid_N3)
         for one, other in zip(again, expected, strict=True):
             np.testing.assert_array_equal(one, other)
+
+
+def test_a_shard_whose_name_alone_was_read_counts(tmp_path):
+    shards = [Shard(small_shard(tmp_path, object_id=f"cup_{i}", seed=i)) for i in range(5)]
+    assert [shard.object_id for shard in shards] == [f"cup_{i}" for i in range(5)]
+    assert ["_file" in vars(shard) for shard in shards] == [False, False, True, True, True]
+
+
+def test_what_the_system_refuses_is_no_damage(tmp_path, monkeypatch):
+    path = small_shard(tmp_path)
+    full = OSError(errno.EMFILE, "Unable to open file (errno = 24, error message = 'Too many open files')")
+    monkeypatch.setattr(h5py, "File", Mock(side_effect=full))
+    with pytest.raises(UserError, match=r"\.h5: Too many open files; raise the limit on open files"):
+        Shard(path).rgb(0)
 
 
 MANY = """
