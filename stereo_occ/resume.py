@@ -52,7 +52,17 @@ class SaveLatest(Checkpoint):
 
 
 class SaveBest(ModelCheckpoint):
-    """Keeps the state of the best validation beside the latest, also where their folder has been moved."""
+    """Keeps the state of the best validation as ``best.ckpt`` in ``folder``, also where that has been moved."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(
+            folder,
+            filename="best",
+            monitor="val/iou",
+            mode="max",
+            auto_insert_metric_name=False,
+            enable_version_counter=False,
+        )
 
     @property
     def state_key(self) -> str:

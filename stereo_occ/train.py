@@ -127,12 +127,17 @@ def build_callbacks(
 ) -> list[Callback]:
     """Checkpoints (the best, and ``kept``), metrics file, pictures, progress bar."""
     validation = typed.validation
-    named = {"monitor": "val/iou", "auto_insert_metric_name": False, "enable_version_counter": False}
-    states: list[Callback] = [SaveBest(folder, filename="best", mode="max", **named)]
+    states: list[Callback] = [SaveBest(folder)]
     if validation.keep_all:
         states.append(
             ModelCheckpoint(
-                folder, filename="step_{step:06d}", save_top_k=-1, save_weights_only=True, **named
+                folder,
+                filename="step_{step:06d}",
+                monitor="val/iou",
+                save_top_k=-1,
+                save_weights_only=True,
+                auto_insert_metric_name=False,
+                enable_version_counter=False,
             )
         )
     callbacks: list[Callback] = [
