@@ -25,10 +25,11 @@ are refused, and names that are no plain names. A shard appears under its name o
 SHA-256 of the whole file (:func:`checksum_path`), as ``sha256sum`` writes it.
 """
 
+import errno
 import json
+import os
 from dataclasses import dataclass
 from functools import cached_property
-from os import strerror
 from pathlib import Path
 from typing import Any, Self
 
@@ -47,6 +48,9 @@ from stereo_occ.system_errors import REMEDIES
 
 FORMAT = "stereo_occ.shard"
 VERSION = 1
+
+#: What keeps a shard from being read that may be as it should.
+NO_DAMAGE = (errno.EMFILE, errno.ENFILE, errno.EACCES, errno.EPERM, errno.EIO)
 
 #: Of more views than this the cameras and poses are read one by one: those of a thousand take a tenth of a second.
 ROWS_AT_ONCE = 128
@@ -96,8 +100,8 @@ class Shard:
         return file
 
     def _damaged(self, error: Exception) -> UserError:
-        if isinstance(error, OSError) and error.errno in REMEDIES:  # the shard may be as it should
-            return UserError(f"{self.path}: {strerror(error.errno)}; {REMEDIES[error.errno]}")
+        if isinstance(error, OSError) and error.errno in NO_DAMAGE:
+            return UserError(f"{self.path}: {os.strerror(error.errno)}; {REMEDIES[error.errno]}")
         reason = " ".join(str(error).split())
         return UserError(f"{self.path}: cannot read the shard ({reason}); delete it and render again")
 
