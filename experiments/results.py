@@ -151,7 +151,7 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
             run_tables.less,
             {
                 f"`{name}`, {where} objects": WHOLE / f"{name}_against_quarter{suffix}"
-                for name in (MONO, "stereo", TWIN, "plane_sweep_guided")
+                for name in (folder.name for folder in runs_of(WHOLE))
                 for where, suffix in (("test", ""), ("real", "_real"))
             },
             ("iou",),
