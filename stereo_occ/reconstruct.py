@@ -102,7 +102,7 @@ def write_result(result: Reconstruction, settings: ReconstructConfig) -> None:
         "stereo_occ": __version__,
         "checkpoint": settings.checkpoint,
         "frame": settings.frame.value,
-        **result.description(),
+        **result.description(mesh),
     }
     write_whole(output.with_suffix(".json"), (json.dumps(description, indent=2) + "\n").encode())
     write_mesh(mesh, output)

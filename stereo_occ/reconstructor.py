@@ -97,9 +97,9 @@ class Reconstruction:
         below_a_pixel = simplified(self.mesh, self.unit / 500)
         return preview(below_a_pixel, self.pair, self.images, boxes, self.framing.cameras)
 
-    def description(self) -> dict[str, Any]:
-        """Plain values for a JSON file."""
-        mesh = self.mesh
+    def description(self, mesh: Trimesh | None = None) -> dict[str, Any]:
+        """Plain values for a JSON file, of the mesh or of the same in another frame."""
+        mesh = self.mesh if mesh is None else mesh
         return {
             "unit": "m",
             "volume": float(mesh.volume),

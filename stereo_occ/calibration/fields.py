@@ -64,7 +64,7 @@ class Fields:
         # OpenCV heads its files "%YAML:1.0", which is no YAML.
         text = "\n".join(line for line in text.splitlines() if not line.startswith("%YAML"))
         try:
-            values = yaml.load(text, _Loader)
+            values = next(yaml.load_all(text, _Loader), None)  # ROS ends each message with "---"
         except (yaml.YAMLError, RecursionError, ValueError) as error:  # ValueError: of dates and numbers
             mark = getattr(error, "problem_mark", None)
             where = f", line {mark.line + 1}" if mark else ""

@@ -62,7 +62,8 @@ def _lines(content: Content, folder: str, galleries: Sequence[str]) -> Iterator[
         yield f"![Pairs, predicted and true meshes]({folder}/figure_5.png)\n"
     if "failures" in galleries:
         yield "## Failures\n"
-        yield "The lowest `iou` of the views not shown above, and where the model is farthest behind the other.\n"
+        behind = ", and where the model is farthest behind the other" if content.against else ""
+        yield f"The lowest `iou` of the views not shown above{behind}.\n"
         yield f"![Failures]({folder}/failures.png)\n"
     for name, title in TITLES.items():
         if name in content.plots:

@@ -68,6 +68,8 @@ def test_the_rig_frame_and_the_way_back(checkpoint, tmp_path):
     result = reconstruct(checkpoint, tmp_path / "mug.ply", "frame=rig", "preview=false")
     read = trimesh.load(tmp_path / "mug.ply")
     said = json.loads((tmp_path / "mug.json").read_text())
+    np.testing.assert_allclose(said["center"], read.bounds.mean(axis=0), atol=1e-6)
+    np.testing.assert_allclose(said["extents"], read.extents, atol=1e-6)
     read.apply_transform(said["left_from_rig"])
     np.testing.assert_allclose(read.bounds, result.mesh.bounds, atol=1e-6)
     assert not (tmp_path / "mug_preview.png").exists()

@@ -139,7 +139,9 @@ def files(kind, folder):
         return [write(folder / "intrinsics.yaml", values), write(folder / "extrinsics.yaml", extrinsics)]
     if kind == "ros":
         left, right = ros_pair()
-        return [write(folder / "left.yaml", left), write(folder / "right.yaml", right)]
+        files = [write(folder / "left.yaml", left), write(folder / "right.yaml", right)]
+        files[0].write_text(files[0].read_text() + "---\n")  # as "ros2 topic echo --once" ends
+        return files
     return write(folder / "own.yaml", own(*(("mm", 0.001) if kind == "own in mm" else ())))
 
 
