@@ -150,8 +150,10 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
         "quarter": partial(
             run_tables.less,
             {
-                f"`{name}`, {where} objects": WHOLE / f"{name}_against_quarter{suffix}"
-                for name in (folder.name for folder in runs_of(WHOLE))
+                f"`{folder.name}`, {where} objects": folder.with_name(
+                    f"{folder.name}_against_quarter{suffix}"
+                )
+                for folder in runs_of(WHOLE)
                 for where, suffix in (("test", ""), ("real", "_real"))
             },
             ("iou",),

@@ -7,7 +7,7 @@ import sys
 import warnings
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -20,7 +20,6 @@ from omegaconf.errors import InterpolationKeyError
 
 from stereo_occ.config import register_schemas
 from stereo_occ.errors import UserError
-from stereo_occ.group import is_first
 from stereo_occ.models.extension import load_extensions
 from stereo_occ.paths import conf_dir
 from stereo_occ.printable import printable
@@ -71,7 +70,7 @@ def entry_point(
             register_schemas()  # a launcher's process does not know them yet
             folder = Path(HydraConfig.get().runtime.output_dir)
             try:
-                with claimed(folder) if is_first() else nullcontext(), _traces_removed(folder):
+                with claimed(folder), _traces_removed(folder):
                     load_extensions()
                     return task(cfg)
             except Exception as error:

@@ -13,9 +13,9 @@ from stereo_occ.checkpoint import KEY, config_of, plain, read_checkpoint
 from stereo_occ.errors import UserError
 from stereo_occ.writing import whole_file
 
-#: What must not change between the parts of a run. Hardware, logging and the length of the run may.
+#: What as a whole must not change between the parts of a run. Hardware, logging and the length of the run may.
 FIXED = (
-    "data", "rig", "placement", "lights", "material", "texture", "background", "sensor", "categories",
+    "rig", "placement", "lights", "material", "texture", "background", "sensor", "categories",
     "model", "init", "control", "augmentation", "auxiliary", "averaging", "queries", "optimizer",
     "seed", "points", "batch_size",
 )  # fmt: skip
@@ -66,7 +66,7 @@ class SaveBest(ModelCheckpoint):
 
     @property
     def state_key(self) -> str:
-        """Lightning's own."""
+        """Lightning's own class's, so that runs go on whose checkpoints are from before this class."""
         return super().state_key.replace(type(self).__qualname__, ModelCheckpoint.__qualname__, 1)
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
@@ -128,14 +128,16 @@ def _fixed(config: Mapping[str, Any]) -> dict[str, Any]:
 
     Of files it is what they hold, which is compared for itself, and not where they are or how long they may be read.
     """
-    data = {
-        key: value
-        for key, value in config["data"].items()
-        if key not in ("root", "time_limit", "memory_limit")
+    return {
+        "data": _without(config["data"], "root", "time_limit", "memory_limit"),
+        **{name: config[name] for name in FIXED},
+        "scheduler": _without(config["scheduler"], "warmup"),
+        "validation.decision": config["validation"]["decision"],
     }
-    scheduler = {key: value for key, value in config["scheduler"].items() if key != "warmup"}
-    rest = {"scheduler": scheduler, "validation.decision": config["validation"]["decision"]}
-    return {name: config[name] for name in FIXED} | {"data": data} | rest
+
+
+def _without(settings: Mapping[str, Any], *keys: str) -> dict[str, Any]:
+    return {key: value for key, value in settings.items() if key not in keys}
 
 
 def step_to_resume(checkpoint: Path, config: dict[str, Any], objects: Mapping[str, list[str]]) -> int:

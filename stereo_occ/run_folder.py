@@ -1,4 +1,4 @@
-"""What a run folder holds of its command, and what is removed where a command did nothing."""
+"""Whose a run folder is, what it holds of its command, and what is removed where a command did nothing."""
 
 import fcntl
 import os
@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from stereo_occ.errors import UserError
+from stereo_occ.group import is_first
 
 #: The overrides of a training's command line.
 OVERRIDES = "overrides.yaml"
@@ -17,27 +18,31 @@ OVERRIDES = "overrides.yaml"
 def claimed(folder: Path) -> Iterator[None]:
     """Let no other process run in a folder that is no working directory, as long as the context lasts.
 
-    Where the system knows no locks of folders, as on some network drives, it is not kept from it.
+    Of a group of processes the first claims it for all. Where the system knows no locks of folders, as on some network
+    drives, nobody is kept from it.
 
     Raises:
         UserError: another process has claimed the folder.
     """
-    if folder.resolve() == Path.cwd() or not folder.is_dir():
+    if folder.resolve() == Path.cwd() or not folder.is_dir() or not is_first():
         yield
         return
     descriptor = os.open(folder, os.O_RDONLY)
     try:
-        with suppress(OSError):
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise UserError(
-                    f"hydra.run.dir={folder}: another process is running in this folder; wait for it, or give "
-                    f"another folder"
-                ) from error
+        with suppress(OSError):  # no locks here
+            _lock(descriptor, folder)
         yield
     finally:
         os.close(descriptor)
+
+
+def _lock(descriptor: int, folder: Path) -> None:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise UserError(
+            f"hydra.run.dir={folder}: another process is running in this folder; wait for it, or give another folder"
+        ) from error
 
 
 def remove_traces(folder: Path) -> None:

@@ -33,7 +33,7 @@ def write_shard(path: Path, shape: Shape, views: Views, pools: Mapping[str, Poin
     image = _file_image(shape, views, pools)
     checksum = f"{hashlib.sha256(image).hexdigest()}  {path.name}\n".encode()
     try:
-        # The inner file is there first: no shard without its checksum.
+        # The inner file is there first, so no shard without its checksum; a full disk shows before either is.
         with whole_file(path) as shard_file, whole_file(checksum_path(path)) as checksum_file:
             shard_file.write(image)
             shard_file.flush()

@@ -28,7 +28,6 @@ from stereo_occ.writing import whole_file
 #: What reading an entry raises that is not there or not whole.
 DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
 
-
 #: Of files that are all there is of a mesh.
 ALONE = (".off", ".stl")
 

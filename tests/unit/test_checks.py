@@ -112,7 +112,8 @@ def four_cores(monkeypatch):
         ("augmentation.mirror=2", "augmentation.mirror=2.0: must be between 0 and 1"),
         (
             "augmentation.roll_deg=5",
-            "augmentation.roll_deg=5.0: model=stereo has no way to know how its cameras have rolled; say augment",
+            "augmentation.roll_deg=5.0: model=stereo has no way to know how its cameras have rolled; "
+            "say augmentation.roll_deg=0",
         ),
         ("auxiliary.depth=-1", "auxiliary.depth=-1.0: must be at least 0"),
         ("averaging.decay=1", "averaging.decay=1.0: must be at least 0 and below 1, or null"),
