@@ -122,6 +122,8 @@ def main(cfg: DictConfig) -> None:
         "%s: %.0f cm3, centre %.3f right, %.3f down, %.3f m forward of the left camera, confidence %.2f",
         cfg.output, 1e6 * result.mesh.volume, x, y, z, result.confidence,
     )  # fmt: skip
+    for doubt in result.doubts:
+        logger.warning("%s", doubt)
     logger.info("seconds: %s", ", ".join(f"{name} {value:.2f}" for name, value in result.seconds.items()))
 
 

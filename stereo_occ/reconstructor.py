@@ -20,12 +20,13 @@ from stereo_occ.data.rigs import RectifiedRigConfig
 from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import transform_points
-from stereo_occ.mesh_output import simplified
+from stereo_occ.mesh_output import collapsed, simplified
 from stereo_occ.models.base import StereoViews
 from stereo_occ.packaged import DEFAULT
 from stereo_occ.photographs.color import vertex_colors
+from stereo_occ.photographs.doubts import doubts
 from stereo_occ.photographs.framing import Framing, frame_on_fixation, frame_on_object
-from stereo_occ.photographs.given import ImageFile, Pair, locate_pair, photo_of
+from stereo_occ.photographs.given import ImageFile, Pair, both, locate_pair, photos_of
 from stereo_occ.photographs.locate import Found
 from stereo_occ.photographs.match import SIDES
 from stereo_occ.photographs.outline import preview
@@ -64,6 +65,7 @@ class Reconstruction:
         left_from_cube: 4x4 similarity from the working cube, whose side is ``unit`` metres.
         threshold: occupancy probability at the surface.
         confidence: the IoU that the model itself expects, 0 to 1.
+        doubts: what speaks against the answer, a line each.
         seconds: of each stage.
     """
 
@@ -76,6 +78,7 @@ class Reconstruction:
     pair: RealPair
     images: tuple[NDArray[np.uint8], NDArray[np.uint8]]
     framing: Framing
+    doubts: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -94,7 +97,7 @@ class Reconstruction:
     def preview(self) -> NDArray[np.uint8]:
         """RGB: both photographs with the mesh's outline, and the parts of them that the model was given."""
         boxes = None if self.found is None else [part.box for part in self.found]
-        below_a_pixel = simplified(self.mesh, self.unit / 500)
+        below_a_pixel = collapsed(self.mesh, self.unit / 500)
         return preview(below_a_pixel, self.pair, self.images, boxes, self.framing.cameras)
 
     def description(self, mesh: Trimesh | None = None) -> dict[str, Any]:
@@ -111,6 +114,7 @@ class Reconstruction:
             "faces": len(mesh.faces),
             "threshold": self.threshold,
             "confidence": self.confidence,
+            "doubts": self.doubts,
             "left_from_rig": self.left_from_rig.tolist(),
             "left_from_cube": self.left_from_cube.tolist(),
             "cube_side": self.unit,
@@ -176,7 +180,7 @@ class Reconstructor:
         """The mesh of the object in a pair.
 
         Args:
-            left, right: image files, or RGB ``(H, W, 3)``.
+            left, right: image files, Pillow's images, or RGB ``(H, W, 3)``.
             rig: calibration, or its files; see :func:`~stereo_occ.calibration.read_calibration`, also for ``unit``
                 and ``rectified``.
             boxes: around the object in each image: left, top, right, bottom, pixels. One is enough.
@@ -184,7 +188,7 @@ class Reconstructor:
                 masks: the images' transparency, else what ``find`` finds, else ``center`` and ``size``, else what
                 stands out from a plain background.
             find: mug, bowl or bottle: the likeliest one in the left image, by a detector that is fetched once.
-            center: of the object, left camera's frame, metres; triangulated if None.
+            center: of the object ``(3,)``, left camera's frame, metres; triangulated if None.
             size: diagonal of the object's bounding box, metres; from the boxes if None.
 
         Raises:
@@ -193,15 +197,17 @@ class Reconstructor:
         seconds: dict[str, float] = {}
         with _timed(seconds, "read"):
             pair = rig if isinstance(rig, RealPair) else read_calibration(rig, unit, rectified)
-            photos = photo_of(left, "left"), photo_of(right, "right")
+            photos = photos_of(left, right)
             pair = pair.fitted((photos[0].size, photos[1].size))
+        boxes, masks = both(boxes, "boxes"), both(masks, "masks")
+        center_3 = None if center is None else _place(center)
         on_object = isinstance(self.config.rig, RectifiedRigConfig)
         with _timed(seconds, "locate"):
             shown = any(part is not None for part in (*boxes, *masks, find, *(p.mask_HW for p in photos)))
-            required = on_object and (shown or center is None or size is None)
+            required = on_object and (shown or center_3 is None or size is None)
             found = locate_pair(pair, photos, boxes, masks, find, required)
         with _timed(seconds, "frame"):
-            framing = self._frame(pair, found, find, center, size)
+            framing = self._frame(pair, found, find, center_3, size)
             views = self._views(pair, photos, found, framing)
         with _timed(seconds, "encode"):
             occupancy = self.predict(views)
@@ -221,8 +227,9 @@ class Reconstructor:
         images = photos[0].rgb_HW3, photos[1].rgb_HW3
         with _timed(seconds, "finish"):
             # Slivers that marching cubes leaves would become holes when a file's single precision merges their corners.
-            sliver = 1e-3 * framing.unit / surface.resolution
-            mesh = simplified(mesh, max(surface.simplify or 0, sliver))
+            mesh = collapsed(mesh, 1e-3 * framing.unit / surface.resolution)
+            if surface.simplify:
+                mesh = simplified(mesh, surface.simplify)
             if surface.color:
                 clearance = framing.unit / surface.resolution
                 masks_2 = [None, None] if found is None else [part.mask_HW for part in found]
@@ -238,6 +245,7 @@ class Reconstructor:
             pair,
             images,
             framing,
+            self._doubts(pair, found, framing),
             seconds,
         )
 
@@ -246,21 +254,22 @@ class Reconstructor:
         pair: RealPair,
         found: tuple[Found, Found] | None,
         find: str | None,
-        center: Sequence[float] | None,
+        center_3: NDArray[np.float64] | None,
         size: float | None,
     ) -> Framing:
         config, side = self.config.rig, self.config.data.image_side
         if isinstance(config, RectifiedRigConfig):
-            center_3 = None if center is None else np.asarray(center, dtype=np.float64)
-            if center_3 is not None and (center_3.shape != (3,) or not np.isfinite(center_3).all()):
-                raise UserError(f"center={list(center or [])}: must be [x,y,z] in metres")
             return frame_on_object(pair, config, self.config.placement.kind, side, found, center_3, size)
-        if (find, center, size) != (None, None, None):
+        if any(part is not None for part in (find, center_3, size)):
             raise UserError(
                 f"find, center, size: the checkpoint {self.name} looks at the whole view about the point where the "
                 f"cameras' axes meet, so these have no effect; leave them out"
             )
         return frame_on_fixation(pair, config, side)
+
+    def _doubts(self, pair: RealPair, found: tuple[Found, Found] | None, framing: Framing) -> list[str]:
+        config = self.config.rig
+        return doubts(pair, found, framing, config) if isinstance(config, RectifiedRigConfig) else []
 
     def _views(
         self, pair: RealPair, photos: tuple[Photo, Photo], found: tuple[Found, Found] | None, framing: Framing
@@ -293,6 +302,13 @@ class Reconstructor:
             torch.as_tensor(np.stack([camera.K for camera in cameras]), dtype=torch.float32)[None],
             torch.as_tensor(np.stack([c.camera_from_rig for c in cameras]), dtype=torch.float32)[None],
         )
+
+
+def _place(center: Sequence[float]) -> NDArray[np.float64]:
+    center_3 = np.asarray(center, dtype=np.float64)
+    if center_3.shape != (3,) or not np.isfinite(center_3).all():
+        raise UserError(f"center={center_3.tolist()}: must be [x,y,z] in metres")
+    return center_3
 
 
 @contextmanager

@@ -7,13 +7,10 @@ from typing import Any
 from stereo_occ.calibration.fields import Fields
 from stereo_occ.calibration.formats import from_opencv, from_own, from_ros
 from stereo_occ.calibration.lens import Lens
-from stereo_occ.calibration.pair import RealCamera, RealPair
+from stereo_occ.calibration.pair import UNITS, RealCamera, RealPair
 from stereo_occ.errors import UserError
 
 __all__ = ["Lens", "RealCamera", "RealPair", "read_calibration"]
-
-#: Metres per unit.
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 
 def read_calibration(
@@ -25,7 +22,7 @@ def read_calibration(
         paths: one file, or several: left and right camera_info, or intrinsics and extrinsics.
         unit: of lengths in the files: m, cm, mm, in, or metres as a number (the side of a chessboard's square, where
             that was 1); None: what the file says under ``unit``, else metres.
-        rectified: whether the images are rectified already, by these files' P1 and P2.
+        rectified: whether the images are rectified already, by these files' P1 and P2; our own describe their images.
 
     Raises:
         UserError: a file cannot be read, is of no known kind, or describes no pair.
@@ -45,7 +42,7 @@ def read_calibration(
         left, right = fields.part("left"), fields.part("right")
         if _is_camera_info(left) and _is_camera_info(right):
             return from_ros(left, right, metres, rectified)
-        return from_own(fields, metres)
+        return from_own(fields, metres, rectified)
     if _is_camera_info(fields):
         raise UserError(
             f"rig={fields.source}: is of one camera; give both, left first: 'rig=[left.yaml,right.yaml]'"

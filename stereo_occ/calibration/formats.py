@@ -84,11 +84,11 @@ def from_ros(left: Fields, right: Fields, metres: float, rectified: bool) -> Rea
     )
 
 
-def from_own(fields: Fields, metres: float) -> RealPair:
+def from_own(fields: Fields, metres: float, rectified: bool) -> RealPair:
     """Our own: ``left`` and ``right``, each with width, height, K, camera_from_rig and perhaps distortion, model.
 
     Raises:
-        UserError: keys are missing or no such matrices.
+        UserError: keys are missing or no such matrices, or what they describe is not ``rectified`` though it should be.
     """
     parts = []
     for name in ("left", "right"):
@@ -101,7 +101,13 @@ def from_own(fields: Fields, metres: float) -> RealPair:
         distortion = part.array("distortion").ravel().tolist() if "distortion" in part else []
         lens = Lens.from_list(distortion, ROS_MODELS[model])
         parts.append((part.array("K", shape=(3, 3)), lens, pose, part.size()))
-    return _relative_to_left(parts)
+    pair = _relative_to_left(parts)
+    if rectified and not (pair.left.lens.ideal and pair.right.lens.ideal and pair.parallel):
+        raise UserError(
+            f"rig={fields.source}: rectified=true, but it describes cameras with distortion or turned against each "
+            f"other; give it the K of the rectified images, no distortion and no rotation, or leave rectified= out"
+        )
+    return pair
 
 
 def _ros_lens(fields: Fields) -> Lens:

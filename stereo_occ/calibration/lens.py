@@ -1,6 +1,7 @@
 """What a lens does to an image: OpenCV's two models, both ways."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,11 +65,12 @@ class Lens:
         if self.ideal:
             return points_N2
         ideal_N2 = points_N2.copy()
-        for _ in range(50):
-            error_N2 = self.distort(ideal_N2) - points_N2
-            if np.abs(error_N2).max(initial=0) < 1e-10:
-                break
-            ideal_N2 = ideal_N2 - np.linalg.solve(self._slope(ideal_N2), error_N2[..., None])[..., 0]
+        with suppress(np.linalg.LinAlgError):
+            for _ in range(50):
+                error_N2 = self.distort(ideal_N2) - points_N2
+                if np.abs(error_N2).max(initial=0) < 1e-10:
+                    break
+                ideal_N2 = ideal_N2 - np.linalg.solve(self._slope(ideal_N2), error_N2[..., None])[..., 0]
         near = np.abs(self.distort(ideal_N2) - points_N2).max(initial=0) < 1e-6
         # Beyond the radius where the image folds back there are solutions, too, that no light takes.
         unfolded = (np.linalg.det(self._slope(ideal_N2)) > 0) & ((ideal_N2 * points_N2).sum(axis=1) >= 0)

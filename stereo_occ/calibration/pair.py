@@ -12,6 +12,12 @@ from stereo_occ.geometry.camera import Camera, StereoRig, check_rigid, resized_i
 #: Baselines that a pair of cameras for household objects may have, metres.
 BASELINES = (0.005, 3.0)
 
+#: Baselines among which a unit is looked for that its file may have forgotten, metres.
+LIKELY = (0.02, 0.5)
+
+#: Metres per unit.
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+
 #: Between the optical axes, degrees: more than this sees no household object from both sides.
 MOST_APART = 90.0
 
@@ -70,9 +76,8 @@ class RealCamera:
         Raises:
             UserError: if they are of another shape, or focal length or principal point say that the size is not theirs.
         """
-        low, high = (
-            (0.25, 0.75) if self.size is None else (-0.5, 1.5)
-        )  # a part of an image may have it outside
+        # A part cut out of an image may have it far outside.
+        low, high = (0.25, 0.75) if self.size is None else (-4, 5)
         center_2 = (self.K[:2, 2] + 0.5) / (self.size or (width, height))
         if not ((center_2 > low) & (center_2 < high)).all():
             where = f"the principal point of the {name} camera is at ({self.K[0, 2]:.0f}, {self.K[1, 2]:.0f})"
@@ -126,9 +131,11 @@ class RealPair:
             )
         baseline = self.baseline
         if not BASELINES[0] <= baseline <= BASELINES[1]:
-            hint = "millimetres? add unit=mm" if baseline > BASELINES[1] else "another unit? set unit="
+            likely = [name for name, metres in UNITS.items() if LIKELY[0] <= metres * baseline <= LIKELY[1]]
+            hint = f"are its lengths in {' or '.join(likely)}? " if baseline > BASELINES[1] and likely else ""
             raise UserError(
-                f"rig: the cameras are {baseline:.6g} m apart, expected {BASELINES[0]} to {BASELINES[1]} m; {hint}"
+                f"rig: the cameras are {baseline:.6g} m apart, expected {BASELINES[0]} to {BASELINES[1]} m; "
+                f"{hint}set unit={likely[0] if hint else ''}"
             )
         x, y, z = self.baseline_direction
         if abs(x) < max(abs(y), abs(z)):
@@ -151,6 +158,11 @@ class RealPair:
     def baseline(self) -> float:
         """Metres between the optical centres."""
         return float(np.linalg.norm(self.right.center_3 - self.left.center_3))
+
+    @property
+    def parallel(self) -> bool:
+        """Whether the cameras' axes are, to a hundredth of a degree."""
+        return bool(np.allclose(self.left.rotation_33, self.right.rotation_33, atol=2e-4))
 
     @property
     def baseline_direction(self) -> NDArray[np.float64]:
@@ -180,7 +192,8 @@ class RealPair:
     def rectified(self) -> StereoRig:
         """Parallel cameras at the same places, with one K, whose rows are the same: what the pair would see turned.
 
-        Rig frame: the left camera's as calibrated. Nothing changes for a pair that is rectified already.
+        Both have the left image's size. Rig frame: the left camera's as calibrated. Nothing changes for a pair that is
+        rectified already.
         """
         x_3 = (self.right.center_3 - self.left.center_3) / self.baseline
         z_3 = self.left.rotation_33[2] + self.right.rotation_33[2]
@@ -189,9 +202,9 @@ class RealPair:
         R_33 = np.stack([x_3, y_3, np.cross(x_3, y_3)])
         focal = float(np.mean([camera.K[[0, 1], [0, 1]] for camera in self.cameras]))
         cameras = []
+        width, height = _size(self.left)
+        K = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
         for camera in self.cameras:
-            width, height = _size(camera)
-            K = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
             pose = np.eye(4)
             pose[:3, :3], pose[:3, 3] = R_33, -R_33 @ camera.center_3
             cameras.append(Camera(K, pose, width, height))

@@ -44,12 +44,16 @@ class Framing:
         cameras: the same in the left camera's frame, metres.
         cube_from_left: 4x4 similarity from there to the cube.
         unit: metres per unit of the cube.
+        whole: cameras of the whole images that the views are parts of, metres.
+        boxes: of the object in those.
     """
 
     rig: StereoRig
     cameras: tuple[Camera, Camera]
     cube_from_left: NDArray[np.float64]
     unit: float
+    whole: StereoRig
+    boxes: tuple[Box, Box]
 
 
 def frame_on_object(
@@ -103,7 +107,7 @@ def frame_on_object(
         unit = cube.unit if size is None else fill * size
         cube = cube_at(rig, (left, right), side, where_3, unit, margin)
     cameras = tuple(crop.camera(camera) for crop, camera in zip(cube.crops, rig.cameras, strict=True))
-    return Framing(cube.rig, (cameras[0], cameras[1]), cube.cube_from_source, cube.unit)
+    return Framing(cube.rig, (cameras[0], cameras[1]), cube.cube_from_source, cube.unit, rig, (left, right))
 
 
 def frame_on_fixation(pair: RealPair, config: RigConfig, side: int) -> Framing:
@@ -142,7 +146,9 @@ def frame_on_fixation(pair: RealPair, config: RigConfig, side: int) -> Framing:
         Camera(view.K, camera.camera_from_rig, side, side)
         for view, camera in zip(views, cube.rig.cameras, strict=True)
     ]
-    return Framing(StereoRig(*told), (views[0], views[1]), cube.cube_from_source, unit)
+    return Framing(
+        StereoRig(*told), (views[0], views[1]), cube.cube_from_source, unit, rig, (whole[0], whole[1])
+    )
 
 
 def _angles(config: RigConfig) -> tuple[float, float]:

@@ -5,28 +5,49 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from stereo_occ.calibration import RealPair
 from stereo_occ.errors import UserError
 from stereo_occ.photographs.locate import Found, in_box, in_mask, on_plain_background
 from stereo_occ.photographs.match import SIDES, matched
-from stereo_occ.photographs.photo import Photo, read_mask, read_photo
+from stereo_occ.photographs.photo import Photo, developed, open_image, read_mask, whiter
 
 Pair = tuple[Any, Any]
-ImageFile = str | Path | NDArray[np.uint8]
+ImageFile = str | Path | Image.Image | NDArray[np.uint8]
 
 
-def photo_of(image: ImageFile, name: str) -> Photo:
-    """A photograph from a file or from RGB ``(H, W, 3)``.
+def photos_of(left: ImageFile, right: ImageFile) -> tuple[Photo, Photo]:
+    """A pair of photographs, each a file, Pillow's image, or RGB ``(H, W, 3)``.
 
     Raises:
-        UserError: it is neither; ``name`` is what the message calls it.
+        UserError: one is none of these, or cannot be read.
     """
+    photos = developed([_image(image, name) for image, name in zip((left, right), SIDES, strict=True)])
+    return photos[0], photos[1]
+
+
+def _image(image: ImageFile, name: str) -> Image.Image:
+    if isinstance(image, Image.Image):
+        return image
+    if isinstance(image, str | Path):
+        return open_image(Path(image), name)
     if not isinstance(image, np.ndarray):
-        return read_photo(Path(image), name)
+        raise UserError(f"{name}: must be a file or RGB (H, W, 3), got {type(image).__name__}")
     if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
         raise UserError(f"{name}: an array must be (H, W, 3) of uint8, got {image.shape} of {image.dtype}")
-    return Photo(image)
+    return Image.fromarray(image)
+
+
+def both(parts: Pair, name: str) -> Pair:
+    """What is given of the left and of the right image.
+
+    Raises:
+        UserError: it is not of two images.
+    """
+    if isinstance(parts, tuple | list) and len(parts) == len(SIDES):
+        return parts[0], parts[1]
+    raise UserError(f"{name}: must be (left, right), None for what is not known, got {type(parts).__name__}")
 
 
 def locate_pair(
@@ -74,7 +95,7 @@ def _given(photo: Photo, box: Any, mask: Any, name: str) -> Found | None:
         if isinstance(mask, np.ndarray):
             if mask.shape != photo.rgb_HW3.shape[:2] or not mask.any():
                 raise UserError(f"{name}_mask: must have the image's size and true pixels, got {mask.shape}")
-            mask_HW = mask.astype(bool)
+            mask_HW = whiter(mask)
         else:
             mask_HW = read_mask(Path(mask), f"{name}_mask", photo.size)
     if mask_HW is not None and not mask_HW.any():

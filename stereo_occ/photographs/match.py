@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
 from stereo_occ.calibration import RealCamera, RealPair
 from stereo_occ.errors import UserError
@@ -28,6 +29,9 @@ STRIP, REACH = 0.15, 0.12
 
 #: Correlations below which there is no such object, or an edge is left where the whole box has it.
 LEAST, LEAST_STRIP = 0.5, 0.6
+
+#: Samples of the wanted part of a rectified image, to see what of it the photograph shows.
+COLUMNS, ROWS = 513, 9
 
 SIDES = ("left", "right")
 
@@ -55,14 +59,16 @@ def matched(pair: RealPair, photos: tuple[Photo, Photo], known: Found, index: in
     width = box.right - box.left
     scale = min(1.0, COMPARED / max(width, box.bottom - box.top))
     farthest_apart = rig.left.K[0, 0] * pair.baseline / NEAREST
-    seen_from, seen_to = _columns(rig.cameras[other], pair.cameras[other])
-    first = max(seen_from, box.left - (0 if other == 0 else farthest_apart)) - REACH * width
-    last = min(seen_to, box.right + (farthest_apart if other == 0 else 0)) + REACH * width
-    if last - first < width:
+    reach_2 = (0, farthest_apart) if other == 0 else (-farthest_apart, 0)
+    seen = _seen_columns(
+        rig.cameras[other], pair.cameras[other], box, (box.left + reach_2[0], box.right + reach_2[1])
+    )
+    if seen is None or seen[1] - seen[0] < (1 - 2 * REACH) * width:
         raise UserError(
             f"{SIDES[other]}: what is in the {SIDES[index]} image there is not in this one; check the box and the "
             f"calibration"
         )
+    first, last = seen[0] - REACH * width, seen[1] + REACH * width
     part_HWC, row_HWC = (
         seen_by(photos[i].rgb_HW3, pair.cameras[i], _rows(rig.cameras[i], box, left, right, scale)) / 255
         for i, left, right in ((index, box.left, box.right), (other, first, last))
@@ -115,15 +121,19 @@ def _edges(part_HWC: NDArray[np.float64], row_HXC: NDArray[np.float64], whole: S
     return shifts[0], shifts[1]
 
 
-def _columns(rectified: Camera, camera: RealCamera) -> tuple[float, float]:
-    """From where to where a photograph reaches in its rectified image, in every row."""
-    width, height = rectified.width, rectified.height
-    v_N = np.linspace(-0.5, height - 0.5, 9)
-    left_N, right_N = (
-        pixels_in(rectified, camera, np.stack([np.full_like(v_N, u), v_N], axis=1))[:, 0]
-        for u in (-0.5, width - 0.5)
-    )
-    return float(left_N.max()), float(right_N.min())
+def _seen_columns(
+    rectified: Camera, camera: RealCamera, box: Box, wanted: tuple[float, float]
+) -> tuple[float, float] | None:
+    """The longest run of the wanted columns of a rectified image that its photograph shows in all rows of the box."""
+    u_N, v_M = np.linspace(*wanted, COLUMNS), np.linspace(box.top, box.bottom, ROWS)
+    grid_N2 = np.stack(np.meshgrid(u_N, v_M), axis=-1).reshape(-1, 2)
+    across_MN = pixels_from(rectified, camera, grid_N2)[:, 0].reshape(ROWS, COLUMNS)
+    assert camera.size is not None
+    runs_N, count = label(((across_MN >= -0.5) & (across_MN <= camera.size[0] - 0.5)).all(axis=0))
+    if not count:
+        return None
+    shown = u_N[runs_N == 1 + np.bincount(runs_N)[1:].argmax()]
+    return float(shown[0]), float(shown[-1])
 
 
 def _middle(height: int, width: int) -> NDArray[np.float64]:

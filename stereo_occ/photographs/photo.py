@@ -1,6 +1,7 @@
 """Photographs: reading any image file, and what another camera at the same place would have taken."""
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
@@ -45,8 +46,8 @@ class Photo:
         return self.rgb_HW3.shape[1], self.rgb_HW3.shape[0]
 
 
-def read_photo(path: Path, name: str) -> Photo:
-    """Any image file that Pillow reads: grey, palette, RGB, RGBA; 8 or 16 bits; turned as its EXIF tag says.
+def open_image(path: Path, name: str) -> Image.Image:
+    """Any image file that Pillow reads, turned as its EXIF tag says.
 
     Args:
         name: of the setting that gives the path, for messages.
@@ -54,10 +55,44 @@ def read_photo(path: Path, name: str) -> Photo:
     Raises:
         UserError: if there is no such file, or it is no image.
     """
-    image = _open(path, name)
-    if image.mode.startswith(("I", "F")):
-        rgb_HW3 = np.repeat(_to_bytes(np.asarray(image))[..., None], 3, axis=2)
-        return Photo(rgb_HW3)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit is ours
+            image = Image.open(path)
+        with image:
+            if image.width * image.height > MOST_PIXELS:
+                raise Image.DecompressionBombError
+            image.load()
+            return ImageOps.exif_transpose(image)
+    except FileNotFoundError as error:
+        raise UserError(f"{name}={path}: no such file") from error
+    except UnidentifiedImageError as error:
+        raise UserError(f"{name}={path}: is no image; give PNG, JPEG, TIFF, BMP, WebP or PGM") from error
+    except Image.DecompressionBombError as error:
+        raise UserError(
+            f"{name}={path}: has more than {MOST_PIXELS / 1e6:.0f} million pixels; scale it down, the calibration is "
+            f"scaled with it"
+        ) from error
+    except (OSError, SyntaxError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise UserError(f"{name}={path}: cannot be read ({reason})") from error
+
+
+def developed(images: Sequence[Image.Image]) -> list[Photo]:
+    """Photographs of images of any mode: grey, palette, RGB, RGBA; 8 or 16 bits.
+
+    Grey levels of more than 8 bits are of one depth in all of them, so a pair keeps the brightness that it has.
+    """
+    grey = [np.asarray(image) for image in images if _has_grey_levels(image)]
+    full = _full_scale(grey)
+    return [_developed(image, full) for image in images]
+
+
+def _developed(image: Image.Image, full: float) -> Photo:
+    if _has_grey_levels(image):
+        levels_HW = np.nan_to_num(np.asarray(image).astype(np.float64), posinf=0, neginf=0)
+        bytes_HW = np.rint(255 * levels_HW.clip(0) / full).astype(np.uint8)
+        return Photo(np.repeat(bytes_HW[..., None], 3, axis=2))
     if not image.has_transparency_data:
         return Photo(np.asarray(image.convert("RGB")))
     rgba_HW4 = np.asarray(image.convert("RGBA"))
@@ -66,13 +101,13 @@ def read_photo(path: Path, name: str) -> Photo:
 
 
 def read_mask(path: Path, name: str, size: tuple[int, int]) -> NDArray[np.bool_]:
-    """A mask ``(H, W)`` of a photograph of this width and height: what is not black, or not transparent.
+    """A mask ``(H, W)`` of a photograph of this width and height: what is white rather than black, or opaque.
 
     Raises:
-        UserError: as :func:`read_photo`; if the size differs, or nothing or all of it is object.
+        UserError: as :func:`open_image`; if the size differs, or nothing or all of it is object.
     """
-    photo = read_photo(path, name)
-    mask_HW = photo.rgb_HW3.max(axis=2) > 0 if photo.mask_HW is None else photo.mask_HW
+    (photo,) = developed([open_image(path, name)])
+    mask_HW = whiter(photo.rgb_HW3.max(axis=2)) if photo.mask_HW is None else photo.mask_HW
     if photo.size != size:
         raise UserError(
             f"{name}={path}: has {photo.size[0]} x {photo.size[1]} pixels, its image {size[0]} x {size[1]}"
@@ -81,6 +116,12 @@ def read_mask(path: Path, name: str, size: tuple[int, int]) -> NDArray[np.bool_]
         what = "is empty" if not mask_HW.any() else "covers the whole image"
         raise UserError(f"{name}={path}: {what}; the object must be white on black")
     return mask_HW
+
+
+def whiter(levels_HW: NDArray[np.generic]) -> NDArray[np.bool_]:
+    """Where a mask is set: above half of its largest level, as soft edges and JPEG's ripples are not."""
+    levels = levels_HW.astype(np.float64)
+    return np.asarray(levels > levels.max(initial=0) / 2)
 
 
 def seen_by(
@@ -145,36 +186,14 @@ def _corners(target: Camera) -> NDArray[np.float64]:
     return np.array([[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]])
 
 
-def _to_bytes(values_HW: NDArray[np.generic]) -> NDArray[np.uint8]:
-    """Of 10, 12, 14 or 16 bits whichever the largest value needs; fractions are of 1."""
-    values = np.nan_to_num(values_HW.astype(np.float64), posinf=0, neginf=0)
-    peak = values.max(initial=0)
-    if values_HW.dtype.kind == "f" and peak <= 1:
-        full = 1.0
-    else:
-        full = next((depth for depth in DEPTHS if peak <= depth), peak)
-    return np.rint(255 * values.clip(0) / full).astype(np.uint8)
+def _has_grey_levels(image: Image.Image) -> bool:
+    """More than 8 bits of one channel."""
+    return image.mode.startswith(("I", "F"))
 
 
-def _open(path: Path, name: str) -> Image.Image:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit is ours
-            image = Image.open(path)
-        with image:
-            if image.width * image.height > MOST_PIXELS:
-                raise Image.DecompressionBombError
-            image.load()
-            return ImageOps.exif_transpose(image)
-    except FileNotFoundError as error:
-        raise UserError(f"{name}={path}: no such file") from error
-    except UnidentifiedImageError as error:
-        raise UserError(f"{name}={path}: is no image; give PNG, JPEG, TIFF, BMP, WebP or PGM") from error
-    except Image.DecompressionBombError as error:
-        raise UserError(
-            f"{name}={path}: has more than {MOST_PIXELS / 1e6:.0f} million pixels; scale it down, the calibration is "
-            f"scaled with it"
-        ) from error
-    except (OSError, SyntaxError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise UserError(f"{name}={path}: cannot be read ({reason})") from error
+def _full_scale(images: Sequence[NDArray[np.generic]]) -> float:
+    """White: of 10, 12, 14 or 16 bits whichever the largest value needs; fractions are of 1."""
+    peak = max((float(np.max(image, initial=0, where=np.isfinite(image))) for image in images), default=0.0)
+    if peak <= 1 and all(image.dtype.kind == "f" for image in images):
+        return 1.0
+    return float(next((depth for depth in DEPTHS if peak <= depth), peak))

@@ -33,11 +33,24 @@ class Surface:
         distance_N = np.full(len(points_N3), np.inf)
         for part in np.array_split(np.arange(len(points_N3)), len(points_N3) // 100_000 + 1):
             for nearest_P in nearest_NK[part].T:
-                foot_P3 = closest_point(self.triangles_F33[self.face_S[nearest_P]], points_N3[part])
-                distance_N[part] = np.fmin(
-                    distance_N[part], np.linalg.norm(points_N3[part] - foot_P3, axis=1)
-                )
+                triangles_P33 = self.triangles_F33[self.face_S[nearest_P]]
+                distance_N[part] = np.fmin(distance_N[part], _to_triangles(points_N3[part], triangles_P33))
         return distance_N, nearest_NK[:, 0]
+
+
+def _to_triangles(
+    points_N3: NDArray[np.floating], triangles_N33: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Distance ``(N,)`` of each point to its triangle, each in units of the triangle's size.
+
+    trimesh compares areas squared with a constant, so triangles of a millimetre in metres would have no inside.
+    """
+    origin_N3 = triangles_N33[:, 0]
+    size_N = np.ptp(triangles_N33, axis=1).max(axis=1)
+    size_N1 = np.where(size_N > 0, size_N, 1.0)[:, None]
+    local_N3 = (points_N3 - origin_N3) / size_N1
+    foot_N3 = closest_point((triangles_N33 - origin_N3[:, None]) / size_N1[:, None], local_N3)
+    return np.asarray(np.linalg.norm(local_N3 - foot_N3, axis=1) * size_N1[:, 0])
 
 
 def spread(

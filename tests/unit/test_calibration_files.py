@@ -188,8 +188,13 @@ def test_units(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "options", "complaint"),
     [
-        ({"T": (1000 * T).tolist()}, {}, "apart, expected 0.005 to 3.0 m; millimetres\\? add unit=mm"),
-        ({"T": (T / 1000).tolist()}, {}, "another unit"),
+        (
+            {"T": (1000 * T).tolist()},
+            {},
+            "apart, expected 0.005 to 3.0 m; are its lengths in mm\\? set unit=mm",
+        ),
+        ({"T": (100 * T).tolist()}, {}, "are its lengths in cm or in\\? set unit=cm"),
+        ({"T": (T / 1000).tolist()}, {}, "expected 0.005 to 3.0 m; set unit=$"),
         ({"T": (-T).tolist()}, {}, "left camera is right of the right one.*swap left and right"),
         ({"T": [0, -0.06, 0], "R": np.eye(3).tolist()}, {}, "must be side by side"),
         ({"R": (1.1 * R).tolist()}, {}, "R and T of the right camera.*must be a rotation"),
@@ -264,9 +269,14 @@ def test_lenses_are_opencvs_and_invertible(coefficients, fisheye, first, last):
     np.testing.assert_allclose(lens.undistort(distorted_N2), POINTS_N2, atol=1e-8)
 
 
-def test_a_lens_that_folds_the_image_says_so():
+@pytest.mark.parametrize(
+    ("coefficients", "fisheye", "point"),
+    [([-5.0, 0, 0, 0, 0], False, (0.9, 0.9)), ([0.0] * 4, True, (1.7, 0.0)), ([0.0] * 4, True, (40.0, 40.0))],
+)
+def test_where_a_lens_shows_nothing_it_says_so(coefficients, fisheye, point):
+    """Beyond where it folds the image; beyond 90 degrees from the axis."""
     with pytest.raises(UserError, match="cannot be removed"):
-        Lens.from_list([-5.0, 0, 0, 0, 0]).undistort(np.array([[0.9, 0.9]]))
+        Lens.from_list(coefficients, fisheye).undistort(np.array([point]))
 
 
 def test_scaled_images_scale_the_cameras():
@@ -302,6 +312,32 @@ def read_pair(**changes):
 def test_images_of_another_size(sizes, changes, complaint):
     with pytest.raises(UserError, match=complaint):
         read_pair(**changes).fitted(sizes)
+
+
+def test_a_part_cut_out_far_from_the_axis_is_an_image_of_its_own(tmp_path):
+    """The last 200 x 200 pixels of a wide image: the axis is 1.4 widths left of them."""
+    values = own()
+    for name in ("left", "right"):
+        K = np.array(values[name]["K"])
+        K[:2, 2] -= [760, 340]
+        values[name] |= {"K": K.tolist(), "width": 200, "height": 200}
+    pair = read_calibration(write(tmp_path / "cut.yaml", values)).fitted(((200, 200),) * 2)
+    whole = read_calibration(write(tmp_path / "own.yaml", own()))
+    points_N3 = np.array([[0.3, 0.15, 0.8]])
+    np.testing.assert_allclose(pair.left.pixels(points_N3), whole.left.pixels(points_N3) - [760, 340])
+
+
+def test_our_own_file_of_unrectified_cameras_is_not_of_rectified_images(tmp_path):
+    path = write(tmp_path / "own.yaml", own())
+    assert read_calibration(path).left.lens.coefficients.any()
+    with pytest.raises(UserError, match="rectified=true, but it describes cameras with distortion or turned"):
+        read_calibration(path, rectified=True)
+    values = own()
+    values["right"]["camera_from_rig"] = (np.array(values["left"]["camera_from_rig"])).tolist()
+    values["right"]["camera_from_rig"][0][3] -= 0.06
+    for name in ("left", "right"):
+        del values[name]["distortion"]
+    assert read_calibration(write(path, values), rectified=True).baseline == pytest.approx(0.06)
 
 
 def test_rays_lead_back_to_their_pixels():

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from PIL import Image
 from samples import single_line
+from scipy.ndimage import gaussian_filter
 
 from stereo_occ.calibration import Lens, RealCamera
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import Camera
 from stereo_occ.geometry.crop import Box
 from stereo_occ.photographs.locate import in_box, in_mask, on_plain_background
-from stereo_occ.photographs.photo import read_mask, read_photo, seen_by
+from stereo_occ.photographs.photo import developed, open_image, read_mask, seen_by
 
 W, H = 48, 32
 GREY = np.linspace(0, 255, W * H).reshape(H, W).astype(np.uint8)
@@ -19,6 +20,10 @@ GREY = np.linspace(0, 255, W * H).reshape(H, W).astype(np.uint8)
 def saved(path, array, mode=None):
     Image.fromarray(array, mode).save(path) if mode else Image.fromarray(array).save(path)
     return path
+
+
+def read_photo(path, name):
+    return developed([open_image(path, name)])[0]
 
 
 @pytest.mark.parametrize("suffix", ["png", "tiff", "bmp", "pgm", "webp"])
@@ -36,6 +41,28 @@ def test_sixteen_bit_images_use_the_whole_range(bits, tmp_path):
     values = np.rint(GREY / 255 * (2**bits - 1)).astype(np.uint16)
     photo = read_photo(saved(tmp_path / "x.png", values), "left")
     np.testing.assert_array_equal(photo.rgb_HW3[..., 1], GREY)
+
+
+def test_a_pair_of_sixteen_bits_keeps_its_brightness(tmp_path):
+    """The darker image needs 10 bits alone, the brighter one 12."""
+    images = [
+        open_image(
+            saved(tmp_path / f"{peak}.png", np.linspace(0, peak, W * H, dtype=np.uint16).reshape(H, W)), "x"
+        )
+        for peak in (1000, 4000)
+    ]
+    dark, bright = (photo.rgb_HW3.astype(float) for photo in developed(images))
+    np.testing.assert_allclose(4 * dark, bright, atol=2.5)
+    assert bright.max() == round(255 * 4000 / 4095)
+
+
+def test_soft_and_compressed_masks_count_from_the_middle_on(tmp_path):
+    hard = np.zeros((H, W), np.uint8)
+    hard[8:24, 16:40] = 255
+    soft = gaussian_filter(hard.astype(float), 1.5).astype(np.uint8)
+    for path, levels in (("soft.png", soft), ("hard.jpg", hard), ("ones.png", hard // 255)):
+        mask_HW = read_mask(saved(tmp_path / path, levels), "left_mask", (W, H))
+        assert (mask_HW != (hard > 0)).sum() <= 8, path  # corners
 
 
 def test_transparency_is_a_mask(tmp_path):

@@ -146,6 +146,27 @@ def test_what_the_other_image_does_not_show_is_not_found_there():
         on_object()(*images, pair, boxes=([0, 140, 40, 240], None), surface=COARSE)
 
 
+@pytest.mark.parametrize("index", [0, 1])
+def test_fisheye_lenses_whose_images_end_beyond_90_degrees(index):
+    K = np.array([[190.0, 0, 319.5], [0, 190, 239.5], [0, 0, 1]])
+    lens = Lens.from_list([0.02, -0.01, 0.002, 0.0], fisheye=True)
+    pose = np.eye(4)
+    pose[0, 3] = -0.1
+    pair = RealPair(RealCamera(K, lens, np.eye(4), (640, 480)), RealCamera(K, lens, pose, (640, 480)))
+    images = [np.full((480, 640, 3), 255, np.uint8) for _ in range(2)]
+    for camera, image in zip(pair.cameras, images, strict=True):
+        v, u = np.mgrid[150:330, 220:420]
+        rays_N3 = camera.rays(np.stack([u, v], axis=-1).reshape(-1, 2).astype(float))
+        rays_N3 /= np.linalg.norm(rays_N3, axis=1, keepdims=True)
+        to_ball_3 = np.array([0.05, 0.02, 0.4]) - camera.center_3
+        outside_N = to_ball_3 @ to_ball_3 - (rays_N3 @ to_ball_3) ** 2
+        image[150:330, 220:420][(outside_N < 0.06**2).reshape(u.shape)] = [60, 80, 100]
+    truth = [list(vars(box_of(image)).values()) for image in images]
+    boxes = (truth[0], None) if index == 0 else (None, truth[1])
+    result = on_object()(*images, pair, boxes=boxes, surface=COARSE)
+    np.testing.assert_allclose(list(vars(result.found[1 - index].box).values()), truth[1 - index], atol=2)
+
+
 def test_a_strong_lens_and_a_wide_baseline_leave_the_search_in_the_image():
     K = np.array([[533.0, 0, 319.5], [0, 533, 239.5], [0, 0, 1]])
     lens = Lens.from_list([-0.2656, -0.0467, 0.0018, -0.0003, 0.2523])
@@ -201,6 +222,25 @@ def test_the_size_of_the_images_does_not_matter():
     assert half.mesh.volume == pytest.approx(whole.mesh.volume, rel=0.1)
 
 
+@pytest.mark.parametrize("index", [0, 1])
+def test_cameras_with_images_of_different_size(index):
+    """Twice the pixels and a third of the height cut off below: the same scene comes out."""
+    pair = PAIRS["turned"]
+    plain_ = on_object()(*[photograph(camera) for camera in pair.cameras], pair, surface=COARSE)
+    cameras = list(pair.cameras)
+    K = cameras[index].K.copy()
+    K[:2, 2] += 0.5
+    K[:2] *= 2
+    K[:2, 2] -= 0.5
+    cameras[index] = replace(cameras[index], K=K, size=(2 * W, 2 * H - H // 3))
+    mixed = RealPair(*cameras)
+    images = [photograph(camera) for camera in cameras]
+    result = on_object()(*images, mixed, surface=COARSE)
+    check_outline(result, images, tolerance=4)
+    np.testing.assert_allclose(middle(result.mesh), middle(plain_.mesh), atol=0.006)
+    assert result.mesh.volume == pytest.approx(plain_.mesh.volume, rel=0.1)
+
+
 def test_a_scene_of_twice_the_size_looks_the_same_and_comes_out_twice_as_large():
     pair = PAIRS["turned"]
     pose = pair.right.camera_from_left.copy()
@@ -254,6 +294,59 @@ def test_a_mask_counts_beside_centre_and_size():
     assert result.found is not None
     np.testing.assert_array_equal(result.found[0].mask_HW, masks[0])
     np.testing.assert_allclose(result.left_from_cube[:3, 3], CENTER, atol=1e-9)
+
+
+def test_what_speaks_against_an_answer_is_said():
+    pair = PAIRS["parallel"]
+    images = [photograph(camera) for camera in pair.cameras]
+    boxes = [list(vars(box_of(image)).values()) for image in images]
+    assert on_object()(*images, pair, surface=COARSE).doubts == []
+
+    pose = pair.right.camera_from_left.copy()
+    pose[:3, 3] *= 25  # squares of a chessboard for metres
+    huge = RealPair(pair.left, replace(pair.right, camera_from_left=pose))
+    said = on_object()(*images, huge, surface=COARSE).doubts
+    assert [line.split(" in the model's")[0] for line in said] == [
+        "the cameras are 2 m apart,",
+        "the object is 14.9 m away,",
+        "the object has a size of 3.53 m,",
+    ]
+
+    apart = [
+        [left, top + 15 * side, right, bottom + 15 * side]
+        for side, (left, top, right, bottom) in enumerate(boxes)
+    ]
+    (line,) = on_object()(*images, pair, boxes=apart, surface=COARSE).doubts
+    assert line.startswith("the object's rows differ by 20 % of its height")
+
+    cut = np.full_like(images[0], 255)
+    shift = int(boxes[0][0] + 0.5) + 20
+    cut[:, : W - shift] = images[0][:, shift:]
+    cut_pair = RealPair(
+        replace(pair.left, K=pair.left.K - np.array([[0, 0, shift], [0, 0, 0], [0, 0, 0]])), pair.right
+    )
+    assert (
+        "the object reaches the edge of the left image: what is beyond is not seen"
+        in on_object()(cut, images[1], cut_pair, surface=COARSE).doubts
+    )
+
+
+def test_python_takes_arrays_and_pillows_images():
+    pair = PAIRS["parallel"]
+    images = [photograph(camera) for camera in pair.cameras]
+    masks = tuple(image.min(axis=2) < 128 for image in images)
+    plain_ = on_object()(*images, pair, masks=masks, surface=COARSE)
+    floats = tuple(mask.astype(float) for mask in masks)
+    for given in (
+        on_object()(*map(Image.fromarray, images), pair, masks=masks, surface=COARSE),
+        on_object()(*images, pair, masks=floats, surface=COARSE),
+    ):
+        np.testing.assert_array_equal(given.mesh.vertices, plain_.mesh.vertices)
+    one, other = (
+        on_object()(*images, pair, center=center, size=0.16, surface=COARSE)
+        for center in (CENTER, CENTER.tolist())
+    )
+    np.testing.assert_array_equal(one.mesh.vertices, other.mesh.vertices)
 
 
 def test_the_rig_frame_stands_upright_at_the_cube():
@@ -319,6 +412,8 @@ def test_another_arrangement_than_the_papers_is_refused(pair, complaint):
         ({"masks": (np.zeros((H, W), bool),) * 2}, "left_mask: must have the image's size and true pixels"),
         ({"center": [0, 0, -1], "size": 0.1}, "must be in front of the cameras"),
         ({"center": [0, 0], "size": 0.1}, "must be \\[x,y,z\\] in metres"),
+        ({"boxes": ([10, 10, 20, 20],)}, "boxes: must be \\(left, right\\), None for what is not known"),
+        ({"masks": None}, "masks: must be \\(left, right\\)"),
         ({"size": -1.0}, "size=-1.0: must be metres above 0"),
         ({"boxes": ([300, 100, 340, 140], [400, 100, 440, 140])}, "left and right not swapped"),
         ({"surface": replace(COARSE, threshold=0.9999999)}, "nothing is occupied at a probability of 1"),

@@ -76,6 +76,15 @@ def test_a_filled_cavity_is_a_loss_and_an_absorbed_end_is_none():
     assert deviation(trimesh.util.concatenate(bars), trimesh.boolean.union(bars))["lost_p99"] < 1e-3
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1e-3, 1.0, 1e3])
+def test_distances_are_right_in_any_unit(unit):
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=unit)
+    surface = Surface(ball, unit / 50)
+    distance_N, _ = surface.distance(1.1 * ball.triangles_center, candidates=8)
+    np.testing.assert_allclose(distance_N, 0.1 * np.linalg.norm(ball.triangles_center, axis=1), rtol=1e-3)
+    assert surface.distance(ball.triangles_center)[0].max() < 1e-9 * unit
+
+
 def test_spread_points_leave_no_gap_and_slender_triangles_cost_little():
     triangles = np.array(
         [[[0, 0, 0], [1, 0, 0], [0.2, 0.7, 0]], [[0, 0, 1], [1, 0, 1], [0.5, 1e-5, 1]]], float
