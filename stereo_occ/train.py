@@ -20,6 +20,7 @@ from stereo_occ.config import Resume, TrainConfig
 from stereo_occ.data.datamodule import PairsDataModule
 from stereo_occ.data.objects import Objects, list_objects, training_objects
 from stereo_occ.divergence import StopIfDiverged
+from stereo_occ.errors import UserError
 from stereo_occ.group import is_first, run_in_processes, started_elsewhere
 from stereo_occ.loggers.board import Board
 from stereo_occ.loggers.build import build_boards
@@ -36,6 +37,9 @@ from stereo_occ.writing import write_whole
 logger = logging.getLogger(__name__)
 
 METRICS_FILE = "metrics.json"
+
+#: How torch begins what it raises where batch normalisation has one value alone to normalise.
+ONE_VALUE = "Expected more than 1 value per channel when training"
 
 
 def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None) -> lightning.Trainer:
@@ -86,6 +90,13 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
             f"{command} with hydra.run.dir={folder} goes on from step {kept.step}\n"
         )
         raise SystemExit(143 if isinstance(stop, SIGTERMException) else 130) from stop
+    except ValueError as error:
+        if not str(error).startswith(ONE_VALUE):
+            raise
+        raise UserError(
+            f"batch_size={typed.batch_size}: of images of {typed.data.image_side} pixels this model's last map is one "
+            f"cell, which batch normalisation cannot do with one pair; take more pairs for each process, or larger images"
+        ) from error
     return trainer
 
 

@@ -135,8 +135,8 @@ def members(objects: Sequence[ObjectSource], pairs: PairsConfig, subset: str) ->
     division = split_objects(list(by_key), pairs.data.fractions, pairs.data.seed, given)
     if not division[subset]:
         raise UserError(
-            f"data.name={pairs.data.name}: no object is in {subset}; change data.fractions, or the lists that the "
-            f"data set comes with"
+            f"data.name={pairs.data.name}: no object is in {subset}, by data.fractions={list(pairs.data.fractions)} or "
+            f"the lists that the data set comes with; change these for a training, subset= for an evaluation"
         )
     return [by_key[key] for key in division[subset]]
 

@@ -108,7 +108,7 @@ def test_training_without_objects_is_one_line(root, data_folder, test_shards, tm
         pairs(root, data_folder, f"data.table={tmp_path / 'table.csv'}"), 2, 100, 2, progress=False
     )
     with pytest.raises(
-        UserError, match=r"data.name=meshes: no object is in val; change data.fractions, or the lists"
+        UserError, match=r"no object is in val, by data.fractions=\[.*; change these for a training"
     ):
         data.val_dataloader()
 

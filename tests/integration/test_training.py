@@ -446,6 +446,17 @@ def test_other_runs_go_through(workshop, tmp_path, overrides):
     assert [entry["step"] for entry in history(tmp_path)] == [2]
 
 
+def test_one_pair_where_the_last_map_is_one_cell_is_one_line(workshop, tmp_path):
+    overrides = [
+        o for o in workshop.overrides() if not o.startswith(("model.width", "model.encoder", "batch_size"))
+    ]
+    cfg = compose_config("train", [*overrides, "model=mono", "model.encoder.weights=null", "batch_size=1"])
+    with pytest.raises(
+        UserError, match=r"^batch_size=1: of images of 32 pixels this model's last map is one cell"
+    ):
+        train_module.train(cfg, tmp_path)
+
+
 def test_loading_in_other_processes_gives_the_same_run(workshop, run, tmp_path):
     folder = workshop.train(tmp_path / "run", "trainer.workers=1", "logger=none")
     assert same_weights(run, folder)
