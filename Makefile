@@ -48,14 +48,14 @@ tensorboard: $(READY) ## open the dashboards of every run under outputs/
 	$(RUN)/tensorboard --logdir outputs
 
 results: $(READY) ## the README's table and figures from the files under experiments/
-	$(RUN)/python experiments/results.py
+	$(RUN)/python -m experiments.results
 
 contact-sheets: $(READY) ## one picture per group of variations, in experiments/variation
-	$(RUN)/python experiments/variation/contact_sheets.py
+	$(RUN)/python -m experiments.variation.contact_sheets
 
 figures: $(READY) ## the contact sheet of procedural objects, the drawings of the rigs
-	$(RUN)/python experiments/objects/contact_sheet.py
-	$(RUN)/python experiments/rig/draw.py
+	$(RUN)/python -m experiments.objects.contact_sheet
+	$(RUN)/python -m experiments.rig.draw
 
 lock: ## renew requirements.lock from pyproject.toml (needs uv)
 	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes \

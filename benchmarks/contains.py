@@ -1,6 +1,6 @@
 """Points per second of the inside test, and its errors on solids with a closed formula.
 
-python benchmarks/contains.py
+python -m benchmarks.contains
 """
 
 import platform

@@ -3,7 +3,7 @@
 The occupancy function is a thin-walled cup, plus nothing times a multi-layer perceptron of the decoder's
 size, so that a point costs what it costs in practice.
 
-    python benchmarks/meshing.py
+    python -m benchmarks.meshing
 """
 
 from importlib.metadata import version

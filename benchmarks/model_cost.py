@@ -18,7 +18,7 @@ from omegaconf import DictConfig, OmegaConf
 from torch.utils.flop_counter import FlopCounterMode
 
 from stereo_occ.checkpoint import plain
-from stereo_occ.config import register_schemas
+from stereo_occ.config import TrainConfig, register_schemas
 from stereo_occ.data.rigs import build_rig
 from stereo_occ.geometry.camera import StereoRig
 from stereo_occ.models.base import OccupancyModel, StereoViews
@@ -88,7 +88,9 @@ def mmac(model: OccupancyModel, rig: StereoRig, points: int) -> tuple[float, flo
 
 def costs(size: Size, cfg: DictConfig) -> dict[str, float]:
     """Parameters and multiply-accumulates of a model."""
-    rig = build_rig(OmegaConf.to_object(cfg.rig), size.image_side)
+    typed = OmegaConf.to_object(cfg)
+    assert isinstance(typed, TrainConfig)
+    rig = build_rig(typed.rig, size.image_side)
     model = build_model(plain(cfg.model), rig)
     encode, decode = mmac(model, rig, size.points)
     parameters = sum(p.numel() for p in model.parameters())
@@ -101,7 +103,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, help="JSON file for the rows of the smallest size")
     options = parser.parse_args()
     register_schemas()
-    smallest = {}
+    smallest: dict[str, dict[str, float]] = {}
     print("| model | side | hidden | points | parameters, M | encode, MMAC | decode, MMAC |")
     print("|---|---|---|---|---|---|---|")
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):

@@ -1,4 +1,4 @@
-"""Procedural objects per second: ``python benchmarks/objects.py --count 50``."""
+"""Procedural objects per second: ``python -m benchmarks.objects --count 50``."""
 
 import argparse
 import time

@@ -7,9 +7,11 @@ object (float32 points, packed labels) and one for each pair, of which a random 
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import relu
 
@@ -102,7 +104,7 @@ def npz_batches(folder: Path, batch_size: int, points: int) -> Iterator[Batch]:
         )
 
 
-def _sample(pair: Path, points: int, rng: np.random.Generator) -> tuple[np.ndarray, ...]:  # type: ignore[type-arg]
+def _sample(pair: Path, points: int, rng: np.random.Generator) -> tuple[NDArray[Any], ...]:
     with np.load(pair) as file:
         images = file["images"].astype(np.float32).transpose(0, 3, 1, 2) / 255
         K, camera_from_rig = file["K"].astype(np.float32), file["camera_from_rig"].astype(np.float32)

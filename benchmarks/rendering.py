@@ -8,6 +8,7 @@ import argparse
 import os
 import platform
 import time
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
 from functools import partial
@@ -76,7 +77,7 @@ def main() -> None:
     os.environ |= {"LP_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     versions = ", ".join(f"{name} {version(name)}" for name in ("pyrender", "PyOpenGL", "numpy"))
     print(f"{versions}, {platform.machine()}, one rasteriser thread; pairs per CPU second (times naive)")
-    ways = {
+    ways: dict[str, Callable[[str, int, int], float]] = {
         "naive, 4x multisampled": naive,
         "ours, supersampling 2": partial(ours, 2),
         "ours, supersampling 1": partial(ours, 1),

@@ -84,7 +84,8 @@ def training_steps(task: Task) -> Iterator[None]:
     cfg = compose_config("train", task.overrides)
     lightning_task = build_task(cfg).train()
     model = lightning_task.model
-    optimizer = lightning_task.configure_optimizers()["optimizer"]  # type: ignore[index, call-overload]
+    configured: Any = lightning_task.configure_optimizers()
+    optimizer: torch.optim.Optimizer = configured["optimizer"]
     batches: Iterator[Batch] = cycle(our_data(cfg).train_dataloader())
     if task.way == "reference":
         batches = npz_batches(task.npz, cfg.batch_size, cfg.points)
@@ -96,7 +97,7 @@ def training_steps(task: Task) -> Iterator[None]:
         queries = batch.queries["train"]
         with torch.autocast("cpu", torch.bfloat16, enabled=task.way == "bf16"):
             logits_BN = model(batch.views, queries.points_BN3).float()
-        binary_cross_entropy_with_logits(logits_BN, queries.occupied_BN).backward()
+        binary_cross_entropy_with_logits(logits_BN, queries.occupied_BN).backward()  # type: ignore[no-untyped-call]
         optimizer.step()
         optimizer.zero_grad()
         yield
@@ -151,7 +152,7 @@ def operations(task: Task) -> int:
     """Of the matrix products and convolutions of one step."""
     with FlopCounterMode(display=False) as counter:
         next(training_steps(task))
-    return counter.get_total_flops()
+    return int(counter.get_total_flops())
 
 
 def measure(tasks: list[Task], steps: int, label: str) -> list[tuple[float, float]]:

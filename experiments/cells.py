@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from runs import CATEGORIES
+from experiments.runs import CATEGORIES
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -28,7 +28,7 @@ keep() { # folder of an evaluation, name of its files beside run.sh
 }
 
 collect() { # folder of a run with its evaluations, folder for what is kept of it
-    .venv/bin/python experiments/collect.py "$1" "$2"
+    .venv/bin/python -m experiments.collect "$1" "$2"
     nameless "$2"/*.json
 }
 
@@ -59,5 +59,5 @@ try() { # name, overrides
 }
 
 tabulate() { # names, first that of the run from which the others differ
-    .venv/bin/python experiments/changes.py "$here/$family.csv" "${@/#/$runs/}"
+    .venv/bin/python -m experiments.changes "$here/$family.csv" "${@/#/$runs/}"
 }

@@ -6,7 +6,8 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
-from runs import CATEGORIES, FLOORS, SHORT, load, metrics_of, runs_of
+
+from experiments.runs import CATEGORIES, FLOORS, SHORT, load, metrics_of, runs_of
 
 LINE_OF = {"iou": "-", "iou_bbox": "--", "iou_unrotated": ":"}
 

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-import cells
 import numpy as np
-from runs import CATEGORIES, HERE, load, rows_of
 
-from stereo_occ.metrics.statistics import paired_bootstrap
+from experiments import cells
+from experiments.runs import CATEGORIES, HERE, load, rows_of
+from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 
 TRACED = HERE / "path_traced"
 WAYS = ("masks", "both boxes", "left box alone")
@@ -65,9 +65,14 @@ def less_before() -> str:
         keys = [key for key in now if key[0] == way]
         ours_1V, theirs_1V = (np.array([[side[key] for key in keys]]) for side in (now, before))
         found = paired_bootstrap(ours_1V, theirs_1V, [key[1] for key in keys], [key[2] for key in keys])
-        bounds = (found[place] for place in (*CATEGORIES, "macro"))
-        rows.append([way, *(cells.interval((of.difference, of.low, of.high)) for of in bounds)])
+        rows.append([way, *(_bounds(found[place]) for place in (*CATEGORIES, "macro"))])
     return cells.table(("told", *CATEGORIES, "macro"), rows)
+
+
+def _bounds(found: Difference) -> str:
+    assert found.low is not None, "of one object alone"
+    assert found.high is not None
+    return cells.interval((found.difference, found.low, found.high))
 
 
 def _by_pair(path: Path) -> dict[tuple[str, str, str, str], float]:

@@ -11,12 +11,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import figures
 import numpy as np
-import path_traced_tables
-import run_tables
-import study_tables
-from runs import (
+
+from experiments import figures, path_traced_tables, run_tables, study_tables
+from experiments.runs import (
     DISTANCES,
     FIELD,
     FREE,
@@ -34,7 +32,6 @@ from runs import (
     rows_of,
     runs_of,
 )
-
 from stereo_occ.metrics.statistics import Difference, paired_bootstrap
 
 PROJECT = HERE.parent

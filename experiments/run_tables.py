@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import cells
-from runs import (
+from experiments import cells
+from experiments.runs import (
     CATEGORIES,
     DISTANCES,
     FIELD,

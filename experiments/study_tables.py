@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-import cells
 import numpy as np
-from runs import FLOORS, HERE, RECIPE, load, metrics_of, rows_of, runs_of
+
+from experiments import cells
+from experiments.runs import FLOORS, HERE, RECIPE, load, metrics_of, rows_of, runs_of
 
 BASELINES = ("visual_hull", "sgm", "mean_shape", "nearest_shape", "truth")
 CONTROLS = (

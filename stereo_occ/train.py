@@ -94,8 +94,8 @@ def train(cfg: DictConfig, folder: Path, overrides: Sequence[str] | None = None)
         if not str(error).startswith(ONE_VALUE):
             raise
         raise UserError(
-            f"batch_size={typed.batch_size}: of images of {typed.data.image_side} pixels this model's last map is one "
-            f"cell, which batch normalisation cannot do with one pair; take more pairs for each process, or larger images"
+            f"batch_size={typed.batch_size}: of images of {typed.data.image_side} pixels this model has a last map of "
+            f"one cell, too few for batch normalisation; take more pairs for each process, or larger images"
         ) from error
     return trainer
 

@@ -1,6 +1,6 @@
 """Ways of antialiasing at the objects' outlines: PSNR against 8 x 8 samples a pixel, and a picture to look at.
 
-python experiments/antialiasing/compare.py
+python -m experiments.antialiasing.compare
 """
 
 import argparse
@@ -93,9 +93,11 @@ def main() -> None:
                         errors[way]["mask"].append(((image.mask_2HW.astype(float) - true.mask_2HW) ** 2)[rim])
         pairs = len(CATEGORIES) * options.objects * options.poses
         for way in WAYS:
-            rim, mask, inside = (psnr(errors[way][part]) for part in ("rim", "mask", "in"))
-            ms = 1000 * seconds[way] / pairs
-            lines.append(f"| {side} | {way} | {rim:.1f} | {mask:.1f} | {inside:.1f} | {ms:.1f} |")
+            figures = [
+                *(psnr(errors[way][part]) for part in ("rim", "mask", "in")),
+                1000 * seconds[way] / pairs,
+            ]
+            lines.append(f"| {side} | {way} | " + " | ".join(f"{figure:.1f}" for figure in figures) + " |")
     table = "\n".join(lines)
     print(table)
     (FOLDER / "table.md").write_text(table + "\n")

@@ -1,6 +1,6 @@
 """One threshold for all pairs against one for each: the IoU at every candidate of both rules.
 
-    python experiments/decision/measure.py NAME CHECKPOINT SUBSET [OVERRIDES OF EVALUATE...]
+    python -m experiments.decision.measure NAME CHECKPOINT SUBSET [OVERRIDES OF EVALUATE...]
 
 Writes ``NAME.json`` beside this file: by rule and threshold, the mean IoU of each category. Choose by validation
 objects (SUBSET ``val``), read off what is reached on others.
@@ -10,14 +10,14 @@ import json
 import sys
 from pathlib import Path
 
-from stereo_occ.checkpoint import config_of, read_checkpoint
+from stereo_occ.checkpoint import config_of
 from stereo_occ.cli import compose_config
 from stereo_occ.decision import DecisionRule
-from stereo_occ.evaluation_data import evaluated_pairs, own_settings
+from stereo_occ.evaluation_data import OwnObjects, evaluated_pairs, own_settings
 from stereo_occ.metrics.scores import THRESHOLDS, Scores
 from stereo_occ.predictors import LearnedPredictor
 from stereo_occ.quiet import quiet_libraries
-from stereo_occ.trained import trained_model
+from stereo_occ.trained import read_named, trained_model
 
 HERE = Path(__file__).parent
 COLUMNS = {"mug": "iou/mug", "bowl": "iou/bowl", "bottle": "iou/bottle", "macro": "iou"}
@@ -28,8 +28,9 @@ def measure(checkpoint: str, subset: str, overrides: list[str]) -> dict[str, dic
     cfg = compose_config("evaluate", [f"checkpoint={checkpoint}", "points=20000", *overrides])
     settings = own_settings(cfg)
     settings.subset = subset
-    saved = read_checkpoint(Path(checkpoint))
-    data = evaluated_pairs(cfg, settings, config_of(saved, checkpoint))
+    saved = read_named(checkpoint)
+    training = config_of(saved, checkpoint)
+    data = evaluated_pairs(cfg, settings, training, OwnObjects.of(cfg, settings, training))
     trained = trained_model(saved, checkpoint)
     predictor = LearnedPredictor(trained.model, trained.decision, "cpu", "bf16-mixed")
     scores = {rule: Scores(rule=rule) for rule in DecisionRule}

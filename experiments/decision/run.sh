@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 export OMP_NUM_THREADS=1
-measure() { .venv/bin/python experiments/decision/measure.py "$@" views=4 trainer.threads=1 workers=1; }
+measure() { .venv/bin/python -m experiments.decision.measure "$@" views=4 trainer.threads=1 workers=1; }
 
 guided=outputs/recipe_10k/plane_sweep_guided/best.ckpt field=outputs/field/best.ckpt
 measure recipe_val $guided val

@@ -27,7 +27,7 @@ model() { # name, training overrides
     if [ -n "${REAL:-}" ]; then
         measure "$1" real data=meshes data.root="$REAL" subset=all
     fi
-    .venv/bin/python experiments/collect.py "outputs/laptop_4k/$1" "$here/$1"
+    .venv/bin/python -m experiments.collect "outputs/laptop_4k/$1" "$here/$1"
 }
 
 .venv/bin/python -m stereo_occ.render scale=laptop

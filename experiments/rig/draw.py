@@ -36,9 +36,10 @@ def rays(camera: Camera, depth: float) -> NDArray[np.float64]:
 
 def arrow(axis: Axes, start: NDArray[np.float64], end: NDArray[np.float64], text: str, color: str) -> None:
     """An arrow with its name at the tip."""
-    axis.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1.6})
-    beyond = end + 0.3 * (end - start)
-    axis.annotate(text, beyond, color=color, ha="center", va="center", fontsize=9)
+    style = {"arrowstyle": "-|>", "color": color, "linewidth": 1.6}
+    axis.annotate("", (end[0], end[1]), (start[0], start[1]), arrowprops=style)
+    x, y = end + 0.3 * (end - start)
+    axis.annotate(text, (x, y), color=color, ha="center", va="center", fontsize=9)
 
 
 def camera_axes(axis: Axes, camera: Camera, length: float, unit: float, color: str, name: str) -> None:

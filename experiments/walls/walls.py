@@ -1,6 +1,6 @@
 """How far off a predicted wall is: the IoU of every test object beside the thickness of its walls.
 
-    python experiments/walls/walls.py DATA_FOLDER
+    python -m experiments.walls.walls DATA_FOLDER
 
 DATA_FOLDER holds the shards that the models of ``experiments/recipe_10k`` were measured on. A wall of thickness t whose
 prediction, as thick, lies e beside it has an IoU of (t - e) / (t + e), so an IoU of q says e = t (1 - q) / (1 + q). The
@@ -104,9 +104,15 @@ def draw(objects: Objects) -> None:
     for color, (model, label) in enumerate(MODELS.items()):
         for category, marker in MARKERS.items():
             of_N = objects.category_N == category
-            style = {"s": 18, "marker": marker, "color": f"C{color}", "alpha": 0.7}
-            points = objects.pixels_N[of_N], objects.iou_N[model][of_N]
-            axis.scatter(*points, label=f"{label}, {category}", **style)
+            axis.scatter(
+                objects.pixels_N[of_N],
+                objects.iou_N[model][of_N],
+                s=18,
+                marker=marker,
+                color=f"C{color}",
+                alpha=0.7,
+                label=f"{label}, {category}",
+            )
     line_N = np.geomspace(0.5, 12, 100)
     for off in (0.1, 0.25, 0.5, 1.0):
         axis.plot(line_N, np.clip((line_N - off) / (line_N + off), 0, 1), color="0.6", lw=0.8)

@@ -452,7 +452,7 @@ def test_one_pair_where_the_last_map_is_one_cell_is_one_line(workshop, tmp_path)
     ]
     cfg = compose_config("train", [*overrides, "model=mono", "model.encoder.weights=null", "batch_size=1"])
     with pytest.raises(
-        UserError, match=r"^batch_size=1: of images of 32 pixels this model's last map is one cell"
+        UserError, match=r"^batch_size=1: of images of 32 pixels this model has a last map of one cell"
     ):
         train_module.train(cfg, tmp_path)
 
