@@ -60,14 +60,20 @@ def write_quality_report(folder: Path, records: Sequence[MeshRecord], root: Path
 
 def _write_table(path: Path, records: Sequence[MeshRecord], root: Path) -> None:
     figures = sorted({name for record in records for name in record.outcome.measures})
-    head = ["file", "category", "name", "subset", "status", "repair", "reason"]
+    head = ["file", "category", "name", "subset", "status", "repair", "lost", "reason"]
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, [*head, *figures], restval="")
     writer.writeheader()
     for record in records:
         mesh_file, outcome = record.file, record.outcome
         names = (mesh_file.path.relative_to(root).as_posix(), mesh_file.category, mesh_file.object_id)
-        texts = (mesh_file.subset, outcome.status, "; ".join(outcome.steps), outcome.reason)
+        texts = (
+            mesh_file.subset,
+            outcome.status,
+            "; ".join(outcome.steps),
+            "; ".join(outcome.lost),
+            outcome.reason,
+        )
         measures = {name: f"{round(value, 6):g}" for name, value in outcome.measures.items()}
         writer.writerow(dict(zip(head, (*names, *texts), strict=True)) | measures)
     with whole_file(path) as file:
@@ -89,7 +95,7 @@ def _page(records: Sequence[MeshRecord], header: str, bar: "tqdm[Any]") -> Image
         row, column = divmod(index, COLUMNS)
         x, y = MARGIN + column * CELL_WIDTH, HEADER + row * CELL_HEIGHT
         outcome = record.load()
-        if outcome.mesh is not None:
+        if outcome.mesh is not None and np.ptp(outcome.mesh.bounds, axis=0).any():
             mesh = outcome.mesh.apply_transform(np.linalg.inv(file_from_object(outcome.mesh)))
             sheet.paste(_photograph(mesh), (x, y))
             if mesh.is_volume:
@@ -104,9 +110,8 @@ def _caption(draw: ImageDraw.ImageDraw, x: int, y: int, record: MeshRecord) -> N
     status = record.outcome.status
     name = shorten(f"{record.file.category}/{record.file.object_id}", 48, placeholder="...")
     lines = [status + _figures(record.outcome)]
-    lines += wrap(
-        record.outcome.reason or "; ".join(record.outcome.steps), 54, max_lines=3, placeholder=" ..."
-    )
+    told = record.outcome.reason or "; ".join([*record.outcome.steps, *record.outcome.lost])
+    lines += wrap(told, 54, max_lines=3, placeholder=" ...")
     draw.text((x, y), name, fill="black", font=font)
     for number, line in enumerate(lines, start=1):
         draw.text((x, y + 14 * number), line, fill=COLORS[status], font=font)

@@ -79,7 +79,7 @@ class StereoRenderer:
     def load(self, mesh: Trimesh, colors_V3: NDArray[np.uint8] | None = None) -> None:
         """Make ``mesh`` (object frame) the one that is rendered; ``colors_V3`` are its vertices' own, sRGB."""
         self.close()
-        if mesh.volume < 0:
+        if np.linalg.det(mesh.triangles).sum() < 0:  # six times the volume; trimesh warns where there is none
             mesh = mesh.copy()
             mesh.invert()
         source_V, normals_V3, faces_F3 = split_at_creases(mesh, CREASE_ANGLE)

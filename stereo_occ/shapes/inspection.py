@@ -29,6 +29,7 @@ class Inspection:
         checksum: eight characters that change with mesh and colours; empty if the file cannot be read.
         solid: the same of the mesh alone.
         side_files: SHA-256 of the other files it refers to, see :class:`~stereo_occ.shapes.reading.RawMesh`.
+        lost: what the file asks for and could not be read, in words; likewise.
     """
 
     mesh: Trimesh | None
@@ -39,6 +40,7 @@ class Inspection:
     checksum: str = ""
     solid: str = ""
     side_files: Mapping[str, str] = field(default_factory=dict)
+    lost: tuple[str, ...] = ()
 
     @property
     def status(self) -> str:
@@ -77,7 +79,12 @@ def inspect_mesh(path: Path, root: Path, colors: bool) -> Inspection:
     except UserError as error:
         checksum = _checksum(raw.mesh)
         return Inspection(
-            raw.mesh, reason=str(error), checksum=checksum, solid=checksum, side_files=raw.side_files
+            raw.mesh,
+            reason=str(error),
+            checksum=checksum,
+            solid=checksum,
+            side_files=raw.side_files,
+            lost=raw.lost,
         )
     mesh = repaired.mesh
     own = None if raw.colors is None else raw.colors.at(mesh.vertices)
@@ -90,6 +97,7 @@ def inspect_mesh(path: Path, root: Path, colors: bool) -> Inspection:
         checksum=_checksum(mesh, own),
         solid=_checksum(mesh),
         side_files=raw.side_files,
+        lost=raw.lost,
     )
 
 

@@ -95,6 +95,7 @@ def save(inspection: Inspection, entry: Path) -> None:
         "checksum": inspection.checksum,
         "solid": inspection.solid,
         "side_files": dict(inspection.side_files),
+        "lost": inspection.lost,
     }
     content = BytesIO()
     np.savez(content, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **arrays)  # type: ignore[arg-type]
@@ -122,7 +123,7 @@ def load(entry: Path, header_only: bool = False) -> Inspection:
         if "vertices" in arrays and not header_only:
             mesh = Trimesh(arrays["vertices"], arrays["faces"], process=False)
         colors = arrays["colors"] if "colors" in arrays and not header_only else None
-    return Inspection(mesh, colors, tuple(header.pop("steps")), **header)
+    return Inspection(mesh, colors, tuple(header.pop("steps")), lost=tuple(header.pop("lost")), **header)
 
 
 @cache
@@ -130,6 +131,7 @@ def _code() -> str:
     """What a result depends on besides the file: the code of reading and repair, and the libraries they rest on."""
     names = (
         "reading.py",
+        "gltf.py",
         "surface_colors.py",
         "inspection.py",
         "quality.py",

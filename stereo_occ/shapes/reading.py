@@ -1,16 +1,22 @@
 """What a mesh file holds: triangles in their places, and colours where it has some."""
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from io import BytesIO
+from pathlib import Path, PurePosixPath
 from stat import S_ISREG
+from urllib.parse import unquote
 
 import numpy as np
 import trimesh
+from PIL import Image
 from trimesh import Trimesh
 from trimesh.resolvers import FilePathResolver
+from trimesh.visual import TextureVisuals
 
 from stereo_occ.errors import UserError
+from stereo_occ.shapes.gltf import unread
 from stereo_occ.shapes.surface_colors import SurfaceColors, surface_colors
 
 #: Larger files, and those of more triangles, are not read; scans of household objects have a hundredth of that.
@@ -30,11 +36,13 @@ class RawMesh:
         colors: None where it has none.
         side_files: SHA-256 of the other files that were read, by name relative to the file's folder; empty text for
             those that were asked for and not found.
+        lost: what else the file asks for and could not be read, in words.
     """
 
     mesh: Trimesh
     colors: SurfaceColors | None
     side_files: dict[str, str]
+    lost: tuple[str, ...] = ()
 
 
 class SideFiles(FilePathResolver):
@@ -44,19 +52,30 @@ class SideFiles(FilePathResolver):
         super().__init__(str(source))
         self.root = root.resolve()
         self.seen: dict[str, str] = {}
+        self.lost: dict[str, str] = {}
 
     def get(self, name: str) -> bytes:
         """The content of a file named relative to the model's folder.
+
+        Where there is none, the name is taken without glTF's escapes, and then the file is looked for beside the model:
+        by the last part of a path, as of another computer, and by the last word of a line, as after an MTL's options.
 
         Raises:
             FileNotFoundError: it is not there, or not below the data set's root.
         """
         name = name.strip().replace("\\", "/")
-        content = read_below(Path(self.parent) / name, self.root)
-        self.seen[name] = digest(content)
-        if content is None:
-            raise FileNotFoundError(name)
-        return content
+        last = PurePosixPath(unquote(name)).name
+        for candidate in dict.fromkeys(
+            (name, unquote(name), last, last.split()[-1] if last.split() else last)
+        ):
+            content = read_below(Path(self.parent) / candidate, self.root)
+            self.seen[candidate] = digest(content)
+            if content is not None:
+                if not _is_sound(candidate, content):
+                    self.lost[name] = "is no sound picture"
+                return content
+        self.lost[name] = "is not there"
+        raise FileNotFoundError(name)
 
     def namespaced(self, namespace: str) -> "SideFiles":
         """The same folder: names are kept relative to the model."""
@@ -92,6 +111,17 @@ def digest(content: bytes | None) -> str:
     return "" if content is None else hashlib.sha256(content).hexdigest()
 
 
+def _is_sound(name: str, content: bytes) -> bool:
+    """Whether a file is no picture by its ending, or one that can be read: trimesh would take a broken one for grey."""
+    if PurePosixPath(name).suffix.lower() not in Image.registered_extensions():
+        return True
+    try:
+        Image.open(BytesIO(content)).load()
+    except Exception:  # of any kind, as the parsers' of pictures are
+        return False
+    return True
+
+
 def read_mesh(path: Path, root: Path, colors: bool) -> RawMesh:
     """Read a file of any known format. Other files that it refers to are read if they lie below ``root``.
 
@@ -103,24 +133,43 @@ def read_mesh(path: Path, root: Path, colors: bool) -> RawMesh:
     file_type = path.suffix.lower().removeprefix(".")
     if file_type not in trimesh.available_formats():
         raise UserError(f"reading {path.suffix} files needs pycollada: pip install 'pycollada>=0.8'")
-    try:
-        if reason := fault_of(path):
-            raise UserError(reason)
-        return _read(path, root, colors)
-    except (UserError, MemoryError):
-        raise
-    except Exception as error:  # a broken file makes the parsers fail in any way
-        if colors:  # its pictures may be what is broken
-            return read_mesh(path, root, colors=False)
-        raise UserError(
-            f"cannot be read: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
-        ) from error
-
-
-def _read(path: Path, root: Path, colors: bool) -> RawMesh:
     side_files = SideFiles(path, root)
+    lost: tuple[str, ...] = ()
+    for with_colors in (True, False) if colors else (False,):  # its pictures may be what is broken
+        try:
+            if reason := fault_of(path) or (unread(path) if file_type in ("glb", "gltf") else ""):
+                raise UserError(reason)
+            mesh, found = _read(path, side_files, with_colors)
+        except (UserError, MemoryError):
+            raise
+        except Exception as error:  # a broken file makes the parsers fail in any way
+            failure = error
+            lost = (f"colours: {_words(error)}",)
+        else:
+            lost += tuple(f"{name} {why}" for name, why in side_files.lost.items())
+            return RawMesh(mesh, found, dict(side_files.seen), lost)
+    raise UserError(f"cannot be read: {_words(failure)}") from failure
+
+
+def _parts(scene: trimesh.Scene) -> Iterator[Trimesh]:
+    """Its meshes with triangles in their places, with colours of vertices that a copy of a material's mesh forgets."""
+    for node in scene.graph.nodes_geometry:
+        matrix_44, name = scene.graph[node]
+        geometry = scene.geometry[name]
+        if isinstance(geometry, Trimesh) and len(geometry.faces):
+            part = geometry.copy()
+            if isinstance(geometry.visual, TextureVisuals):
+                part.visual.vertex_attributes.update(dict(geometry.visual.vertex_attributes))
+            yield part.apply_transform(matrix_44)
+
+
+def _words(error: Exception) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+
+
+def _read(path: Path, side_files: SideFiles, colors: bool) -> tuple[Trimesh, SurfaceColors | None]:
     scene = trimesh.load_scene(path, resolver=side_files, process=False, skip_materials=not colors)
-    parts = [part for part in scene.dump() if isinstance(part, Trimesh) and len(part.faces)]
+    parts = [*_parts(scene)]
     if not parts:
         raise UserError("holds no triangles")
     if (triangles := sum(len(part.faces) for part in parts)) > MOST_TRIANGLES:
@@ -138,4 +187,4 @@ def _read(path: Path, root: Path, colors: bool) -> RawMesh:
     if not SIZES[0] <= (side := float(np.ptp(mesh.vertices, axis=0).max())) <= SIZES[1]:
         raise UserError(f"is {side:g} units large, expected {SIZES[0]:g} to {SIZES[1]:g}; scale it")
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    return RawMesh(mesh, surface_colors(parts) if colors else None, dict(side_files.seen))
+    return mesh, surface_colors(parts) if colors else None

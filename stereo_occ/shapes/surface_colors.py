@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from trimesh import Trimesh
 from trimesh.visual import TextureVisuals
-from trimesh.visual.color import linear_to_srgb, uv_to_color
+from trimesh.visual.color import linear_to_srgb, srgb_to_linear, to_float, to_rgba, uv_to_color
 from trimesh.visual.material import PBRMaterial
 
 #: Where a part of an object that has colours has none itself.
@@ -74,17 +74,7 @@ def _part_colors(
     if not _has_colors(part):
         vertex_V3, point_N3 = np.tile(GREY, (len(part.vertices), 1)), np.tile(GREY, (len(face_N), 1))
     elif isinstance(visual, TextureVisuals):
-        material, uv_V2 = visual.material, visual.uv
-        picture = material.baseColorTexture if isinstance(material, PBRMaterial) else material.image
-        if picture is None or uv_V2 is None:
-            color_3 = _flat_color(visual)
-            vertex_V3, point_N3 = (
-                np.tile(color_3, (len(part.vertices), 1)),
-                np.tile(color_3, (len(face_N), 1)),
-            )
-        else:
-            vertex_V3 = uv_to_color(uv_V2, picture)
-            point_N3 = uv_to_color(np.einsum("nk,nkd->nd", weights_N3, uv_V2[corners_N3]), picture)
+        vertex_V3, point_N3 = _material_colors(part, corners_N3, weights_N3)
     elif visual.kind == "face":
         vertex_V3, point_N3 = visual.vertex_colors, visual.face_colors[face_N]
     else:
@@ -93,9 +83,37 @@ def _part_colors(
     return vertex_V3[:, :3], point_N3[:, :3]
 
 
-def _flat_color(visual: TextureVisuals) -> NDArray[np.uint8]:
-    """The one colour of a material; glTF states it in linear light."""
-    color_3 = visual.material.main_color[:3]
-    if isinstance(visual.material, PBRMaterial):
-        return np.rint(255 * linear_to_srgb(color_3)).astype(np.uint8)
-    return np.asarray(color_3, dtype=np.uint8)
+def _material_colors(
+    part: Trimesh, corners_N3: NDArray[np.integer], weights_N3: NDArray[np.floating]
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Colours of a part's vertices ``(V, 3)``, and of points given by their corners and weights ``(N, 3)``.
+
+    glTF multiplies, in linear light, a material's texture with its factor and with the colours of the vertices, each
+    white where there is none.
+    """
+    visual: Any = part.visual
+    material, uv_V2 = visual.material, visual.uv
+    is_gltf = isinstance(material, PBRMaterial)
+    picture = material.baseColorTexture if is_gltf else material.image
+    if picture is not None and uv_V2 is not None:
+        uv_N2 = np.einsum("nk,nkd->nd", weights_N3, uv_V2[corners_N3])
+        vertex_V3, point_N3 = (uv_to_color(uv, picture)[:, :3] for uv in (uv_V2, uv_N2))
+    else:
+        flat_3 = np.array([255, 255, 255] if is_gltf else material.main_color[:3], dtype=np.uint8)
+        vertex_V3, point_N3 = (np.tile(flat_3, (count, 1)) for count in (len(part.vertices), len(corners_N3)))
+    if is_gltf and "color" in visual.vertex_attributes:
+        shade_V3 = to_float(to_rgba(visual.vertex_attributes["color"]))[:, :3]
+        shade_N3 = np.einsum("nk,nkd->nd", weights_N3, shade_V3[corners_N3])
+        vertex_V3, point_N3 = (
+            _times(vertex_V3, srgb_to_linear(shade_V3)),
+            _times(point_N3, srgb_to_linear(shade_N3)),
+        )
+    if is_gltf and material.baseColorFactor is not None:
+        factor_3 = to_float(material.baseColorFactor)[:3]
+        vertex_V3, point_N3 = _times(vertex_V3, factor_3), _times(point_N3, factor_3)
+    return vertex_V3, point_N3
+
+
+def _times(colors_N3: NDArray[np.uint8], factor: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Colours made darker by a factor of linear light."""
+    return np.rint(255 * linear_to_srgb(srgb_to_linear(colors_N3) * factor)).astype(np.uint8)

@@ -11,10 +11,11 @@ import pytest
 from mesh_files import box, put
 from samples import single_line
 
-from stereo_occ.data.meshes import inspect_files
+from stereo_occ.data.meshes import MeshRecord, inspect_files
+from stereo_occ.quality_report import write_quality_report
 from stereo_occ.shapes import reading
 from stereo_occ.shapes.inspection import inspect_mesh
-from stereo_occ.shapes.layouts import list_folder
+from stereo_occ.shapes.layouts import MeshFile, list_folder
 from stereo_occ.shapes.mesh_cache import MeshCache
 
 
@@ -63,6 +64,16 @@ FILES = {
 }  # fmt: skip
 
 
+#: Its one face has no extent; the vertices that no face uses have.
+DEGENERATE = (
+    "a.ply",
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 0 0\n",
+    "",
+)
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_a_file_is_left_out_with_a_reason(tmp_path, name):
     file, content, reason = FILES[name]
@@ -75,6 +86,22 @@ def test_a_file_is_left_out_with_a_reason(tmp_path, name):
     assert outcome.status == "rejected"
     assert single_line(outcome.reason)
     assert re.search(reason, outcome.reason), outcome.reason
+
+
+def test_each_of_them_has_its_row_and_its_place_in_the_report(tmp_path):
+    root = tmp_path / "root"
+    (root / "mug").mkdir(parents=True)
+    records = []
+    for number, (file, content, _) in enumerate([*FILES.values(), DEGENERATE]):
+        path = root / "mug" / f"{number}{Path(file).suffix}"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        records.append(
+            MeshRecord(MeshFile(path, "mug", str(number)), inspect_mesh(path, root, colors=True), None)
+        )
+    write_quality_report(tmp_path, records, root, progress=False)
+    rows = (tmp_path / "quality.csv").read_text().splitlines()
+    assert len(rows) == 1 + len(records)
+    assert (tmp_path / "quality.png").stat().st_size > 1000
 
 
 def test_stated_limits(tmp_path, monkeypatch):

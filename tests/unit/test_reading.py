@@ -1,5 +1,6 @@
 """Mesh files of every format: the same solid, in the object frame, with its colours and the way back."""
 
+import json
 import re
 
 import numpy as np
@@ -10,8 +11,10 @@ from PIL import Image
 from samples import single_line
 
 from stereo_occ.errors import UserError
+from stereo_occ.shapes import gltf as gltf_module
 from stereo_occ.shapes.inspection import inspect_mesh
 from stereo_occ.shapes.layouts import list_folder
+from stereo_occ.shapes.mesh_cache import MeshCache, load
 from stereo_occ.shapes.reading import read_mesh
 
 FORMATS = ["obj", "ply", "stl", "off", "glb", "gltf", "dae"]
@@ -133,6 +136,114 @@ def test_colours_of_materials_and_vertices(tmp_path):
     assert plain.colors is None
 
 
+def textured_obj(root, line):
+    """A textured box whose MTL names its texture in that way; the texture is tex.png beside it."""
+    painted(root, colors=False)
+    (picture,) = root.glob("*.png")
+    picture.rename(root / "tex.png")
+    (material,) = root.glob("*.mtl")
+    material.write_text(f"newmtl {material_name(root)}\nKd 1 1 1\nmap_Kd {line}\n")
+    return root / "model.obj"
+
+
+def material_name(root):
+    return re.search(r"usemtl (\S+)", (root / "model.obj").read_text()).group(1)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["tex.png", "C:\\\\Users\\\\bob\\\\tex.png", "/home/bob/tex.png", "-s 1 1 1 tex.png", "maps/tex.png"],
+)
+def test_textures_are_found_beside_the_model_by_the_name_alone(tmp_path, line):
+    raw = read_mesh(textured_obj(tmp_path, line), tmp_path, colors=True)
+    assert {tuple(color) for color in raw.colors.colors_N3} == {(255, 0, 0), (0, 0, 255)}
+    assert raw.lost == ()
+
+
+def test_a_texture_that_is_not_there_is_said(tmp_path):
+    path = textured_obj(tmp_path, "other.png")
+    assert inspect_mesh(path, tmp_path, colors=True).lost == ("other.png is not there",)
+
+
+def gltf(root, mesh, **changes):
+    """A glTF file with its buffers beside it; changes replace parts of its JSON."""
+    for name, content in trimesh.exchange.gltf.export_gltf(trimesh.Scene(mesh)).items():
+        if name == "model.gltf":
+            content = json.dumps(json.loads(content) | changes).encode()
+        (root / name).write_bytes(content)
+    return root / "model.gltf"
+
+
+def test_names_in_gltf_are_escaped(tmp_path):
+    path = gltf(tmp_path, box(1, 2, 3))
+    for buffer in tmp_path.glob("*.bin"):
+        path.write_text(path.read_text().replace(buffer.name, "my%20" + buffer.name))
+        buffer.rename(tmp_path / f"my {buffer.name}")
+    assert read_mesh(path, tmp_path, colors=True).mesh.volume == pytest.approx(6)
+
+
+@pytest.mark.parametrize(
+    ("extension", "reason"),
+    [
+        ("KHR_draco_mesh_compression", "is compressed .*pip install DracoPy"),
+        ("EXT_meshopt_compression", "is compressed .*export it without"),
+    ],
+)
+def test_compressed_gltf_is_named(tmp_path, extension, reason, monkeypatch):
+    monkeypatch.setattr(gltf_module, "find_spec", lambda name: None)
+    path = gltf(tmp_path, box(1, 1, 1), extensionsUsed=[extension], extensionsRequired=[extension])
+    with pytest.raises(UserError, match=reason):
+        read_mesh(path, tmp_path, colors=False)
+
+
+@pytest.mark.parametrize("suffix", ["gltf", "glb"])
+def test_places_as_fractions_are_refused_and_not_misread(tmp_path, suffix):
+    path = gltf(tmp_path, box(1, 1, 1))
+    scene = json.loads(path.read_text())
+    place = scene["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
+    scene["accessors"][place]["normalized"] = True
+    if suffix == "gltf":
+        path.write_text(json.dumps(scene))
+    else:
+        text = json.dumps(scene).encode()
+        path = tmp_path / "model.glb"
+        sizes = (20 + len(text)).to_bytes(4, "little"), len(text).to_bytes(4, "little")
+        path.write_bytes(b"glTF\x02\0\0\0" + sizes[0] + sizes[1] + b"JSON" + text)
+    with pytest.raises(UserError, match="normalised integers, which are not read"):
+        read_mesh(path, tmp_path, colors=False)
+
+
+def test_gltf_multiplies_textures_factors_and_vertex_colours_in_linear_light(tmp_path):
+    mesh = box(1, 1, 1)
+    red, plain = [255, 0, 0, 255], {"pbrMetallicRoughness": {"metallicFactor": 0.0}}
+    mesh.visual.vertex_colors = red
+
+    def colors(**changes):
+        raw = read_mesh(gltf(tmp_path, mesh, **changes), tmp_path, colors=True)
+        return np.unique(raw.colors.colors_N3, axis=0).tolist()
+
+    def with_material(material):
+        path = gltf(tmp_path, mesh)
+        scene = json.loads(path.read_text())
+        scene["meshes"][0]["primitives"][0]["material"] = 0
+        return colors(materials=[material], meshes=scene["meshes"])
+
+    assert colors() == [[255, 0, 0]]
+    assert with_material(plain) == [[255, 0, 0]]
+    half = {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1.0]}}
+    assert with_material(half) == [[188, 0, 0]]  # half of the light
+    mesh = box(1, 1, 1)
+    assert with_material(plain) == [[255, 255, 255]]
+    picture = Image.new("RGB", (4, 4), (0, 255, 0))
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorTexture=picture, baseColorFactor=[51, 51, 51, 255]
+    )
+    mesh.visual = trimesh.visual.TextureVisuals(uv=np.full((8, 2), 0.5), material=material)
+    ((r, g, b),) = colors()
+    assert (r, b) == (0, 0)
+    assert g == pytest.approx(124, abs=1)  # a fifth of the light
+
+
 def test_materials_and_textures_outside_the_data_set_are_not_read(tmp_path):
     (tmp_path / "outside.mtl").write_text("newmtl red\nKd 1 0 0\n")
     root = tmp_path / "root"
@@ -140,7 +251,8 @@ def test_materials_and_textures_outside_the_data_set_are_not_read(tmp_path):
     (root / "inner").mkdir(parents=True)
     (root / "inner" / "model.obj").write_text(text.replace("../", "../../"))
     raw = read_mesh(root / "inner" / "model.obj", root, colors=True)
-    assert raw.side_files == {"../../outside.mtl": ""}
+    assert raw.side_files == {"../../outside.mtl": "", "outside.mtl": ""}
+    assert raw.lost == ("../../outside.mtl is not there",)
     (root / "outside.mtl").write_text("newmtl red\nKd 1 0 0\n")
     (root / "inner" / "model.obj").write_text(text)
     raw = read_mesh(root / "inner" / "model.obj", root, colors=True)
@@ -151,7 +263,24 @@ def test_materials_and_textures_outside_the_data_set_are_not_read(tmp_path):
 def test_a_broken_picture_costs_the_colours_alone(tmp_path):
     painted(tmp_path, colors=True)
     for picture in tmp_path.glob("*.png"):
-        picture.write_bytes(picture.read_bytes()[:60])
+        picture.write_bytes(picture.read_bytes()[:40])
     inspection = inspect_mesh(tmp_path / "model.obj", tmp_path, colors=True)
     assert inspection.reason == ""
     assert inspection.mesh.is_volume
+    assert inspection.lost == ("material_0.png is no sound picture",)
+
+
+@pytest.mark.parametrize("kept", [40, 4000])
+def test_colours_come_back_with_the_picture(tmp_path, kept):
+    """The entry of a model whose texture was broken, in its head or later, does not outlive the texture's repair."""
+    path = textured_obj(tmp_path, "tex.png")
+    noise = np.random.default_rng(0).integers(0, 2, (64, 64, 3), np.uint8) * [255, 0, 0]
+    Image.fromarray(noise.astype(np.uint8)).resize((256, 256)).save(tmp_path / "tex.png")
+    whole = (tmp_path / "tex.png").read_bytes()
+    (tmp_path / "tex.png").write_bytes(whole[:kept])
+    cache = MeshCache(tmp_path / "cache", tmp_path, colors=True)
+    assert "tex.png is no sound picture" in load(cache.make(path)).lost
+    (tmp_path / "tex.png").write_bytes(whole)
+    assert cache.find(path) is None
+    assert load(cache.make(path)).colors[:, 1:].max() == 0
+    assert load(cache.find(path)).lost == ()

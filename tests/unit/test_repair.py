@@ -75,6 +75,18 @@ def sheet_cup():
     return mesh.subdivide()
 
 
+def scan_without_base(inside_too=False):
+    """A cup on a turntable: no camera saw what it stood on, nor perhaps its bottom inside."""
+    mesh = cup()
+    lowest_F = mesh.triangles[:, :, 2].max(axis=1)
+    kept_F = lowest_F > 1e-6
+    if inside_too:
+        kept_F &= (mesh.triangles[:, :, 2].min(axis=1) < 0.06 - 1e-6) | (lowest_F > 0.06 + 1e-6)
+    mesh.update_faces(kept_F)
+    mesh.remove_unreferenced_vertices()
+    return mesh
+
+
 def handle(capped=True):
     """A bow whose ends stick in the wall of the cup."""
     turn = np.linspace(-np.pi / 2, np.pi / 2, 24)
@@ -334,3 +346,17 @@ def test_a_solid_too_far_from_the_mesh_is_refused(monkeypatch):
     monkeypatch.setattr(package, "MAX_MEAN_DEVIATION", 1e-3)
     with pytest.raises(UserError, match=r"too far from it: .* of the diagonal .* \(at most 0.1\)"):
         repair(sheet_cup())
+
+
+@pytest.mark.parametrize("inside_too", [False, True])
+def test_a_scan_without_its_base_gets_one(inside_too):
+    """Not two thin shells with air in the wall."""
+    repaired = repair(scan_without_base(inside_too))
+    check_solid(repaired.mesh)
+    assert repaired.steps[-1] == f"closed {1 + inside_too} openings between the sides of the wall"
+    assert repaired.mesh.volume == pytest.approx(cup().volume, rel=1e-6)
+    assert repaired.measures["cavity"] > 0.5
+
+
+def test_a_cup_of_one_sheet_is_not_closed_at_its_rim():
+    assert any(step.startswith("gave thickness") for step in repair(sheet_cup()).steps)

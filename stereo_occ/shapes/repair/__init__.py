@@ -12,7 +12,8 @@ from stereo_occ.occupancy.enclosure import overlap
 from stereo_occ.shapes.quality import bodies_and_genus, cavity, deviation, wall_thickness
 from stereo_occ.shapes.repair.faces import drop_doubled, weld, weld_loosely
 from stereo_occ.shapes.repair.gentle import assemble
-from stereo_occ.shapes.repair.topology import is_closed
+from stereo_occ.shapes.repair.holes import close_openings
+from stereo_occ.shapes.repair.topology import is_closed, wound_alike
 from stereo_occ.shapes.repair.wrap import wrap
 
 __all__ = ["Repair", "repair"]
@@ -23,6 +24,8 @@ MAX_FACES = 2_000_000
 FLAT = 0.02
 #: Share of points at which a solid may overlap itself without being made anew.
 MAX_OVERLAP = 2e-4
+#: What counts as a vessel: the wall's thickness as a share of the diagonal, and the cavity's of the whole.
+MAX_WALL, MIN_CAVITY = 0.1, 0.3
 #: How far, in shares of the diagonal, the solid's surface may be from the mesh's.
 MAX_MEAN_DEVIATION, MAX_P99_DEVIATION = 0.01, 0.04
 
@@ -50,7 +53,8 @@ def repair(mesh: Trimesh) -> Repair:
     In this order, each only where needed: weld vertices and drop collapsed faces; drop doubled faces; turn the
     faces of each piece alike; drop specks and sheets that lie on other parts; close pin-holes and ends of
     pieces that lie within others; turn bodies outward and voids inward; drop bodies hidden inside; join bodies
-    that overlap. What then is no solid, or overlaps itself, is wrapped. The same mesh gives the same bytes.
+    that overlap; close a vessel's wall where its two sides do not meet. What then is no solid, or overlaps itself, is
+    wrapped. The same mesh gives the same bytes.
 
     Raises:
         UserError: it cannot be one, or only one too far from the mesh; the message is the reason alone.
@@ -86,6 +90,9 @@ def _solid(unit: Trimesh) -> tuple[Trimesh, Trimesh, list[str]]:
     assembly, done = assemble(unit)
     if assembly is not None and _is_sound(assembly.solid):
         return (assembly.solid if done else unit), assembly.source, steps + done
+    if (closed := _vessel(unit)) is not None:
+        vessel, openings = closed
+        return vessel, vessel, [*steps, f"closed {openings} openings between the sides of the wall"]
     solid, sheet = wrap(unit)
     steps.append("wrapped")
     if sheet > 0.01:
@@ -93,6 +100,24 @@ def _solid(unit: Trimesh) -> tuple[Trimesh, Trimesh, list[str]]:
     if not _is_sound(solid):
         raise UserError("gives no solid, even wrapped")
     return solid, unit, steps
+
+
+def _vessel(unit: Trimesh) -> tuple[Trimesh, int] | None:
+    """A thin wall around a cavity whose two sides do not meet everywhere, as where a scan lacks the base: closed there.
+
+    None of any other mesh: what becomes no vessel when it is closed, as a cup of one sheet, is left to be wrapped.
+    """
+    wound = wound_alike(unit.faces)
+    closed = close_openings(unit.vertices, wound[0]) if wound else None
+    if closed is None:
+        return None
+    vertices_V3, faces_F3, openings = closed
+    solid = Trimesh(vertices_V3, faces_F3, process=False)
+    if solid.is_watertight and solid.volume < 0:
+        solid.invert()
+    if not _is_sound(solid) or wall_thickness(solid)["wall_median"] > MAX_WALL:
+        return None
+    return (solid, openings) if cavity(solid)["cavity"] >= MIN_CAVITY else None
 
 
 class _Frame:

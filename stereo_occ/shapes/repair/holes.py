@@ -11,6 +11,10 @@ from stereo_occ.shapes.repair.topology import Faces, borders
 
 #: A hole of at most this area (2 % of the diagonal across) is a pin-hole.
 PIN_HOLE = 3e-4
+#: Of a scan, the base that it stood on, and the bottom inside that no camera saw.
+MOST_OPENINGS = 2
+#: An opening is flat if no point of its border is farther from a plane.
+FLAT = 0.02
 #: A border or piece this near to a body lies on it.
 ON_BODY = 0.008
 
@@ -45,19 +49,51 @@ def close_pin_holes(
     pin_holes = ends = 0
     for loop in loops:
         points_L3 = vertices_V3[loop]
-        following_L3 = np.roll(points_L3, -1, axis=0)
-        middle_3 = points_L3.mean(axis=0)
-        area = np.linalg.norm(np.cross(points_L3 - middle_3, following_L3 - middle_3), axis=1).sum() / 2
-        if area <= PIN_HOLE:
+        if _area(points_L3) <= PIN_HOLE:
             pin_holes += 1
         elif bodies.hold(points_L3):
             ends += 1
         else:
             return None
+    return *_with_fans(vertices_V3, faces_F3, loops), pin_holes, ends
+
+
+def close_openings(
+    vertices_V3: NDArray[np.float64], faces_F3: Faces
+) -> tuple[NDArray[np.float64], Faces, int] | None:
+    """A piece with all its borders closed by fans, and how many were no pin-holes.
+
+    None if these are more than :data:`MOST_OPENINGS`, or one is not flat.
+    """
+    loops = borders(faces_F3)
+    if not loops:
+        return None
+    wide = [points_L3 for points_L3 in (vertices_V3[loop] for loop in loops) if _area(points_L3) > PIN_HOLE]
+    if len(wide) > MOST_OPENINGS or not all(_is_flat(points_L3) for points_L3 in wide):
+        return None
+    return *_with_fans(vertices_V3, faces_F3, loops), len(wide)
+
+
+def _area(loop_L3: NDArray[np.float64]) -> float:
+    spokes_L3 = loop_L3 - loop_L3.mean(axis=0)
+    return float(np.linalg.norm(np.cross(spokes_L3, np.roll(spokes_L3, -1, axis=0)), axis=1).sum() / 2)
+
+
+def _is_flat(loop_L3: NDArray[np.float64]) -> bool:
+    spokes_L3 = loop_L3 - loop_L3.mean(axis=0)
+    normal_3 = np.linalg.svd(spokes_L3, full_matrices=False)[2][2]
+    return bool(np.abs(spokes_L3 @ normal_3).max() <= FLAT)
+
+
+def _with_fans(
+    vertices_V3: NDArray[np.float64], faces_F3: Faces, loops: list[NDArray[np.int64]]
+) -> tuple[NDArray[np.float64], Faces]:
+    """Loops closed by triangles about their middles."""
+    for loop in loops:
         if len(loop) > 3:
             fan_L3 = np.stack([loop, np.roll(loop, -1), np.full(len(loop), len(vertices_V3))], axis=1)
-            vertices_V3 = np.concatenate([vertices_V3, middle_3[None]])
+            vertices_V3 = np.concatenate([vertices_V3, vertices_V3[loop].mean(axis=0)[None]])
         else:
             fan_L3 = loop[None]
         faces_F3 = np.concatenate([faces_F3, fan_L3])
-    return vertices_V3, faces_F3, pin_holes, ends
+    return vertices_V3, faces_F3
