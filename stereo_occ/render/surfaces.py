@@ -136,6 +136,8 @@ class SurfaceDrawing:
         GL.glDepthMask(GL.GL_TRUE)
         GL.glDepthFunc(GL.GL_LESS)
         GL.glClear(GL.GL_DEPTH_BUFFER_BIT)
+        for index in range(len(STORED)):  # patterns are filtered by differences to the next pixel, at outlines to none
+            GL.glClearBufferfv(GL.GL_COLOR, index, np.zeros(4, np.float32))
         (GL.glDisable if double_sided else GL.glEnable)(GL.GL_CULL_FACE)
         GL.glCullFace(GL.GL_BACK)
         clip_from_rig = _clip_from_camera(camera) @ camera.camera_from_rig

@@ -230,15 +230,21 @@ def test_a_glaze_mirrors_the_window(renderer, mug):
     assert gain.max() > 60
 
 
-def test_pictures_do_not_depend_on_what_was_drawn_before(renderer, mug):
+@pytest.mark.parametrize(
+    ("pattern", "cluttered"),
+    [(Pattern.marble, True), (Pattern.spots, False), (Pattern.checks, False), (Pattern.marble, False)],
+)
+def test_pictures_do_not_depend_on_what_was_drawn_before(renderer, mug, pattern, cluttered):
     pose = poses(1)[0]
-    look = replace(pattern_look(Pattern.marble), clutter=clutter_of(mug, pose))
+    look = replace(pattern_look(pattern), clutter=clutter_of(mug, pose) if cluttered else None)
     renderer.load(mug)
     first = renderer.render(RIG, pose.rig_from_object, look)
     renderer.load(procedural_shape("bottle", 0, 1).mesh)
     renderer.render(toed_in_rig(1.0, 0.3, 1.0, 48), np.eye(4), pattern_look(Pattern.spots))
     renderer.render(RIG, np.eye(4), LOOK)
     renderer.load(mug)
+    for other in poses(4)[1:]:
+        renderer.render(RIG, other.rig_from_object, pattern_look(pattern))
     again = renderer.render(RIG, pose.rig_from_object, look)
     np.testing.assert_array_equal(first.rgb_2HW3, again.rgb_2HW3)
     np.testing.assert_array_equal(first.depth_2HW, again.depth_2HW)
