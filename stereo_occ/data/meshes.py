@@ -6,6 +6,7 @@ from concurrent.futures import Future, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from pebble import ProcessExpired, ProcessPool
 from tqdm import tqdm
 
@@ -16,6 +17,9 @@ from stereo_occ.shapes.inspection import Inspection
 from stereo_occ.shapes.layouts import MeshFile
 from stereo_occ.shapes.mesh_cache import DAMAGED, MeshCache, load
 from stereo_occ.shapes.shape import Shape
+
+#: Solids are copies whose likenesses differ by less than this share: single precision and text files differ by 1e-6.
+ALIKE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,18 +99,26 @@ def inspect_files(
 
 
 def without_copies(records: Sequence[MeshRecord]) -> Iterator[MeshRecord]:
-    """The records, those rejected that hold the same solid as one before them, in whatever colours.
+    """The records, those rejected that hold the same solid as one before them, in whatever colours, size or place.
 
     A solid must not be in two subsets.
     """
-    first: dict[str, MeshFile] = {}
+    kept: list[MeshFile] = []
+    known_K4 = np.zeros((0, 4))
     for record in records:
-        original = first.setdefault(record.outcome.solid or str(record.file.path), record.file)
-        if original is record.file or record.outcome.reason:
+        if record.outcome.reason:
             yield record
-        else:
+            continue
+        likeness_4 = np.array(record.outcome.likeness)
+        alike = np.flatnonzero(np.isclose(known_K4, likeness_4, rtol=ALIKE, atol=0).all(axis=1))
+        if len(alike):
+            original = kept[alike[0]]
             reason = f"is a copy of {original.category}/{original.object_id}"
             yield replace(record, outcome=replace(record.outcome, reason=reason))
+            continue
+        kept.append(record.file)
+        known_K4 = np.concatenate([known_K4, likeness_4[None]])
+        yield record
 
 
 def _start(memory_limit: float) -> None:

@@ -136,7 +136,9 @@ class SurfaceDrawing:
         GL.glDepthMask(GL.GL_TRUE)
         GL.glDepthFunc(GL.GL_LESS)
         GL.glClear(GL.GL_DEPTH_BUFFER_BIT)
-        for index in range(len(STORED)):  # patterns are filtered by differences to the next pixel, at outlines to none
+        for index in range(
+            len(STORED)
+        ):  # patterns are filtered by differences to the next pixel, at outlines to none
             GL.glClearBufferfv(GL.GL_COLOR, index, np.zeros(4, np.float32))
         (GL.glDisable if double_sided else GL.glEnable)(GL.GL_CULL_FACE)
         GL.glCullFace(GL.GL_BACK)

@@ -28,6 +28,7 @@ class Inspection:
         reason: why the file was rejected, in one line; empty if it was not.
         checksum: eight characters that change with mesh and colours; empty if the file cannot be read.
         solid: the same of the mesh alone.
+        likeness: of a solid, figures that copies share wherever they are, turned, scaled or written to another format.
         side_files: SHA-256 of the other files it refers to, see :class:`~stereo_occ.shapes.reading.RawMesh`.
         lost: what the file asks for and could not be read, in words; likewise.
     """
@@ -39,6 +40,7 @@ class Inspection:
     reason: str = ""
     checksum: str = ""
     solid: str = ""
+    likeness: tuple[float, ...] = ()
     side_files: Mapping[str, str] = field(default_factory=dict)
     lost: tuple[str, ...] = ()
 
@@ -96,6 +98,7 @@ def inspect_mesh(path: Path, root: Path, colors: bool) -> Inspection:
         measures,
         checksum=_checksum(mesh, own),
         solid=_checksum(mesh),
+        likeness=_likeness(mesh),
         side_files=raw.side_files,
         lost=raw.lost,
     )
@@ -108,6 +111,12 @@ def file_from_object(mesh: Trimesh) -> NDArray[np.float64]:
     matrix[:3, :3] *= np.linalg.norm(high_3 - low_3)
     matrix[:3, 3] = (low_3 + high_3) / 2
     return matrix
+
+
+def _likeness(mesh: Trimesh) -> tuple[float, ...]:
+    """Surface and principal moments of inertia, made free of place, turn and size by the volume."""
+    moments = np.sort(np.asarray(mesh.principal_inertia_components, float)) / mesh.volume ** (5 / 3)
+    return (float(mesh.area / mesh.volume ** (2 / 3)), *moments.tolist())
 
 
 def _checksum(mesh: Trimesh, colors: NDArray[np.uint8] | None = None) -> str:

@@ -94,6 +94,7 @@ def save(inspection: Inspection, entry: Path) -> None:
         "reason": inspection.reason,
         "checksum": inspection.checksum,
         "solid": inspection.solid,
+        "likeness": inspection.likeness,
         "side_files": dict(inspection.side_files),
         "lost": inspection.lost,
     }
@@ -123,7 +124,9 @@ def load(entry: Path, header_only: bool = False) -> Inspection:
         if "vertices" in arrays and not header_only:
             mesh = Trimesh(arrays["vertices"], arrays["faces"], process=False)
         colors = arrays["colors"] if "colors" in arrays and not header_only else None
-    return Inspection(mesh, colors, tuple(header.pop("steps")), lost=tuple(header.pop("lost")), **header)
+    for name in ("steps", "likeness", "lost"):
+        header[name] = tuple(header[name])
+    return Inspection(mesh, colors, **header)
 
 
 @cache

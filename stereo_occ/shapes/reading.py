@@ -158,7 +158,7 @@ def _parts(scene: trimesh.Scene) -> Iterator[Trimesh]:
         geometry = scene.geometry[name]
         if isinstance(geometry, Trimesh) and len(geometry.faces):
             part = geometry.copy()
-            if isinstance(geometry.visual, TextureVisuals):
+            if isinstance(geometry.visual, TextureVisuals) and isinstance(part.visual, TextureVisuals):
                 part.visual.vertex_attributes.update(dict(geometry.visual.vertex_attributes))
             yield part.apply_transform(matrix_44)
 
