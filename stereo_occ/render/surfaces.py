@@ -136,9 +136,8 @@ class SurfaceDrawing:
         GL.glDepthMask(GL.GL_TRUE)
         GL.glDepthFunc(GL.GL_LESS)
         GL.glClear(GL.GL_DEPTH_BUFFER_BIT)
-        for index in range(
-            len(STORED)
-        ):  # patterns are filtered by differences to the next pixel, at outlines to none
+        # Patterns are filtered by their differences to the next pixel, at an outline to one that is not drawn.
+        for index in range(len(STORED)):
             GL.glClearBufferfv(GL.GL_COLOR, index, np.zeros(4, np.float32))
         (GL.glDisable if double_sided else GL.glEnable)(GL.GL_CULL_FACE)
         GL.glCullFace(GL.GL_BACK)
