@@ -23,6 +23,9 @@ from stereo_occ.shapes.surface_colors import SurfaceColors, surface_colors
 MOST_BYTES = 1_000_000_000
 MOST_TRIANGLES = 5_000_000
 
+#: Endings of the pictures that are looked at before trimesh is given them; none that another program would draw.
+PICTURES = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".tif", ".tiff", ".webp", ".gif")
+
 #: Longest side of the bounding box, in the file's own unit.
 SIZES = (1e-4, 1e7)
 
@@ -65,9 +68,7 @@ class SideFiles(FilePathResolver):
         """
         name = name.strip().replace("\\", "/")
         last = PurePosixPath(unquote(name)).name
-        for candidate in dict.fromkeys(
-            (name, unquote(name), last, last.split()[-1] if last.split() else last)
-        ):
+        for candidate in dict.fromkeys((name, unquote(name), last, *last.split()[-1:])):
             content = read_below(Path(self.parent) / candidate, self.root)
             self.seen[candidate] = digest(content)
             if content is not None:
@@ -113,7 +114,7 @@ def digest(content: bytes | None) -> str:
 
 def _is_sound(name: str, content: bytes) -> bool:
     """Whether a file is no picture by its ending, or one that can be read: trimesh would take a broken one for grey."""
-    if PurePosixPath(name).suffix.lower() not in Image.registered_extensions():
+    if PurePosixPath(name).suffix.lower() not in PICTURES:
         return True
     try:
         Image.open(BytesIO(content)).load()
