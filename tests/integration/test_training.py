@@ -2,6 +2,7 @@
 
 import json
 import signal
+import time
 
 import h5py
 import pytest
@@ -65,6 +66,8 @@ def stopped(workshop, monkeypatch, folder, step, *overrides, reason=None):
     signal.signal(signal.SIGINT, on_interrupt)  # Lightning ignores it from then on
     assert reason is None or stop.value.code in (130, 143)
     assert folder.is_dir()
+    # TensorBoard reads event files of one second and process in the order of a number's text, 9 after 10.
+    time.sleep(1 - time.time() % 1)
     return folder
 
 
