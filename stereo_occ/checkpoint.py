@@ -65,6 +65,8 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
             "global_step": description.get("step"),
             "metrics": description.get("metrics"),
         }
+        if "objects" in description:
+            checkpoint[KEY]["objects"] = description["objects"]
         return _checked(checkpoint, path)
     try:
         if not _is_as_written(path):

@@ -94,6 +94,11 @@ def evaluate(cfg: DictConfig, folder: Path) -> dict[str, float]:
     assert data.prepared is not None
     noted = checkpoint[KEY].get("objects") if checkpoint else None
     check_unseen(asked, data.prepared.sources, own_objects.seen(noted))
+    if noted is None and own_objects.problem:
+        logger.warning(
+            "the training's objects are neither noted nor found (%s): some of these may be among them",
+            own_objects.problem,
+        )
     facts: dict[str, Any] = {"step": None, "parameters": None, "trained": None}
     predictor: Predictor
     if settings.baseline is not None:

@@ -52,6 +52,8 @@ def export(cfg: DictConfig) -> list[Path]:
         "metrics": _metrics(settings.metrics, checkpoint, run),
         "config": checkpoint[KEY]["config"],
     }
+    if (objects := checkpoint[KEY].get("objects")) is not None:
+        description["objects"] = objects
     weights, _, card = outputs(settings.output)
     state = checkpoint["state_dict"]
     state = {name: state[name] for name in state if name == "threshold" or name.startswith("model.")}

@@ -31,7 +31,8 @@ def point_metrics(
         metric: _iou(logits[queries], occupied[queries], threshold) for queries, metric in IOU_OF.items()
     }
     values["iou_at_0.5"] = _iou(logits["cube"], occupied["cube"], 0.5)
-    loss = binary_cross_entropy_with_logits(logits["bbox"], occupied["bbox"].float())
+    bounded = logits["bbox"].clamp(-WORST_LOSS, WORST_LOSS)
+    loss = binary_cross_entropy_with_logits(bounded, occupied["bbox"].float())
     values["loss"] = WORST_LOSS if loss.isnan() else float(loss)
     for queries, suffix in _CALIBRATED.items():
         failed = bool(logits[queries].isnan().any())

@@ -10,7 +10,7 @@ def mesh_iou(predicted: Trimesh, true: Trimesh) -> float | None:
     a, b = _solid(predicted), _solid(true)
     if a is None or b is None:
         return None
-    return float((a ^ b).volume() / (a + b).volume())
+    return min(1.0, float((a ^ b).volume() / (a + b).volume()))  # above by a solid's overlap with itself
 
 
 def _solid(mesh: Trimesh) -> Manifold | None:

@@ -156,8 +156,9 @@ def _galleries(
     if without:
         notes.append(f"No meshes of {_listed(without)}: no views were kept; evaluate again with meshes=1.")
         return {}, {}
-    keys = [key for key in models[0][0].evaluations.keys if all(key in views for views in kept)]
-    places = [models[0][0].evaluations.keys.index(key) for key in keys]
+    place_of = {key: place for place, key in enumerate(models[0][0].evaluations.keys)}
+    keys = [key for key in place_of if all(key in views for views in kept)]
+    places = [place_of[key] for key in keys]
     iou = [model.evaluations.values[METRIC].mean(axis=0)[places] for model, _ in models]
     best = best_median_worst(keys, iou[0])
     shown = [choice.key for choices in best.values() for choice in choices]

@@ -2,6 +2,7 @@
 
 import io
 import re
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import Any
@@ -20,7 +21,7 @@ from stereo_occ.report.models import Model, in_order
 #: Colours that the colour-blind tell apart (Okabe and Ito), for models in the order of the page.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#000000")
 
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 9,
@@ -44,7 +45,7 @@ _VEIL = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1}
 Colored = Sequence[tuple[Model, str]]
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def learning_curves(models: Colored) -> Figure | None:
     """IoU and loss on validation objects along each training, seeds thin and their mean thick."""
     histories = [(model, color, _histories(model)) for model, color in models]
@@ -73,7 +74,7 @@ def learning_curves(models: Colored) -> Figure | None:
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def precision_recall(counts: Mapping[str, Mapping[str, NDArray[np.int64]]], models: Colored) -> Figure | None:
     """Precision over recall of all points of a category, a dot at the decision threshold.
 
@@ -115,7 +116,7 @@ def precision_recall(counts: Mapping[str, Mapping[str, NDArray[np.int64]]], mode
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def reliability(models: Colored) -> Figure:
     """Share of occupied points over what the networks gave as their probability, in 15 bins."""
     categories = in_order(models[0][0].facts["reliability"])
@@ -136,22 +137,15 @@ def reliability(models: Colored) -> Figure:
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def scatter(focus: Model, against: Model, metric: str = "iou") -> Figure:
     """One dot per object: its mean over views and seeds by one model and by the other."""
     categories = in_order(focus.evaluations.categories)
     figure, axes = _panels(len(categories))
-    names = [key[:2] for key in focus.evaluations.keys]
-    of_both = [
-        dict(zip(m.evaluations.keys, m.evaluations.values[metric].mean(axis=0), strict=True))
-        for m in (against, focus)
-    ]
+    of_both = [_by_object(model, metric) for model in (against, focus)]
     for axis, category, color in zip(axes, categories, COLORS[2:], strict=False):
-        objects = sorted({name for name in names if name[0] == category})
-        x_O, y_O = (
-            np.array([np.mean([of[key] for key in of if key[:2] == name]) for name in objects])
-            for of in of_both
-        )
+        objects = sorted(name for name in of_both[1] if name[0] == category)
+        x_O, y_O = (np.array([np.mean(of[name]) for name in objects]) for of in of_both)
         top = 1.05 * max(x_O.max(), y_O.max(), 0.05)
         axis.plot([0, top], [0, top], color="#9aa1ab", linewidth=0.8, linestyle="--")
         axis.scatter(x_O, y_O, s=20, color=color, alpha=0.75, edgecolors="white", linewidths=0.5)
@@ -168,6 +162,15 @@ def scatter(focus: Model, against: Model, metric: str = "iou") -> Figure:
     return figure
 
 
+def _by_object(model: Model, metric: str) -> dict[tuple[str, str], list[float]]:
+    """Means over seeds of each object's views."""
+    found: dict[tuple[str, str], list[float]] = defaultdict(list)
+    values_V = model.evaluations.values[metric].mean(axis=0)
+    for (category, object_id, _), value in zip(model.evaluations.keys, values_V.tolist(), strict=True):
+        found[category, object_id].append(value)
+    return found
+
+
 def svg(figure: Figure, name: str) -> str:
     """The figure as an ``<svg>`` element that scales with its place; the same for the same figure.
 
@@ -175,7 +178,7 @@ def svg(figure: Figure, name: str) -> str:
         name: makes the ids in it differ from those of other figures in one page.
     """
     file = io.StringIO()
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
+    with mpl.rc_context({**STYLE, "svg.hashsalt": name}):
         figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
     text = file.getvalue()
     text = re.sub(r'\bid="', f'id="{name}-', text[text.index("<svg") :])

@@ -5,11 +5,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
 
+import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from stereo_occ.report.content import Content
-from stereo_occ.report.figures import png
+from stereo_occ.report.figures import STYLE, png
 from stereo_occ.report.gallery import GalleryRow, title_of
 from stereo_occ.report.tables import PUBLISHED, Cell, Row
 from stereo_occ.writing import write_whole
@@ -91,6 +92,7 @@ def _text(cell: Cell | None) -> str:
     return "" if cell is None else f"{cell.text} {cell.interval}{' *' if cell.clear else ''}"
 
 
+@mpl.rc_context(STYLE)
 def _contact_sheet(content: Content, gallery: Mapping[str, Sequence[GalleryRow]]) -> bytes:
     """All rows of a gallery as one PNG: left, right, predictions, truth."""
     rows = [row for of_category in gallery.values() for row in of_category]

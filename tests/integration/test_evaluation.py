@@ -18,6 +18,7 @@ from stereo_occ.checkpoint import KEY, read_checkpoint
 from stereo_occ.cli import compose_config
 from stereo_occ.errors import UserError
 from stereo_occ.evaluate import evaluate
+from stereo_occ.export import export
 from stereo_occ.train import train
 
 
@@ -220,6 +221,9 @@ def test_objects_of_the_training_are_not_called_new(workshop, own_meshes, tmp_pa
         workshop.evaluate(run / "best.ckpt", tmp_path / "grown_out", *elsewhere)
     assert not (tmp_path / "grown_out").exists()
     workshop.evaluate(run / "best.ckpt", tmp_path / "all", *elsewhere, "subset=all")
+    export(compose_config("export", [f"checkpoint='{run / 'best.ckpt'}'", f"output='{tmp_path / 'w'}'"]))
+    with pytest.raises(UserError, match=refused):
+        workshop.evaluate(tmp_path / "w.safetensors", tmp_path / "grown_out", *elsewhere)
     assert len(rows(tmp_path / "all" / "per_object.csv")) == 10
 
 

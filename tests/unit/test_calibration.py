@@ -73,6 +73,15 @@ def test_a_failed_view_gets_the_worst_of_everything():
     assert region_metrics(nan, 0.5) == {"handle_recall": 0, "cavity_empty": 0}
 
 
+@pytest.mark.parametrize(("right", "loss"), [(True, 0), (False, 100)])
+def test_infinite_logits_have_a_finite_loss(right, loss):
+    labels = queries([True, False] if right else [False, True])
+    values = point_metrics(queries([float("inf"), -float("inf")]), labels, 0.5)
+    assert values["loss"] == pytest.approx(loss, abs=1e-6)
+    assert values["iou"] == values["iou_bbox"] == float(right)
+    assert all(np.isfinite(value) for value in values.values())
+
+
 def test_parts_are_to_be_occupied_and_cavities_empty():
     logits = torch.tensor([9.0, 9.0, 9.0, -9.0])
     values = region_metrics({"handle_recall": logits, "neck_recall": logits, "cavity_empty": logits}, 0.5)

@@ -160,3 +160,8 @@ def test_what_is_hidden_is_measured_apart():
     result = scores(half, ball(0.3))
     assert result.values["recall_2_visible"] > 0.95
     assert result.values["recall_2_occluded"] < 0.3
+
+
+def test_a_solid_that_overlaps_itself_is_no_more_than_its_like():
+    two = trimesh.util.concatenate([box(0.2, 0.2, 0.2), box(0.2, 0.2, 0.2, shift=(0.1, 0, 0))])
+    assert mesh_iou(two, two) <= 1

@@ -16,6 +16,7 @@ from samples import single_line
 
 from stereo_occ.cli import compose_config
 from stereo_occ.errors import UserError
+from stereo_occ.evaluation_rows import Evaluations
 from stereo_occ.geometry.camera import toed_in_rig
 from stereo_occ.kept_views import ViewKeeper, read_kept_views
 from stereo_occ.mesh_output import few_faces
@@ -23,7 +24,7 @@ from stereo_occ.metrics.curves import LEVELS
 from stereo_occ.report import figures
 from stereo_occ.report.__main__ import check_report, report
 from stereo_occ.report.gallery import GalleryRow, Panel, make_row
-from stereo_occ.report.models import labels_of, model_settings, read_models
+from stereo_occ.report.models import Model, labels_of, model_settings, read_models
 from stereo_occ.report.page import MODEL_VIEWER, model_viewer
 from stereo_occ.report.selection import Choice, best_median_worst, choose_models, failures
 from stereo_occ.report.tables import make_tables
@@ -256,12 +257,28 @@ def test_damaged_curves_are_one_line(tmp_path, of_mugs, of_bowls):
         run(tmp_path, folder)
 
 
-def test_a_label_is_no_formula(tmp_path):
+def test_a_label_is_no_formula(tmp_path, views):
+    """In the page, and in the sheets of pictures beside its Markdown."""
     folders = [
-        evaluation(tmp_path / name, trained=trained("stereo", 0, steps=rf"$\no_{name}$")) for name in "ab"
+        evaluation(tmp_path / name, trained=trained("stereo", 0, steps=rf"$\no_{name}$"), views=views)
+        for name in "ab"
     ]
     page, _ = run(tmp_path, *folders)
     assert r"stereo, steps=$\no_a$" in page
+
+
+def test_dots_of_the_scatter_are_means_of_each_objects_views():
+    """Of 5,000 objects: to look at all views for each of them would take minutes."""
+    keys = [("mug", f"m{index:04}", view) for index in range(5000) for view in range(16)]
+    values = np.linspace(0.1, 0.9, len(keys))
+    models = [
+        Model(name, {}, Evaluations(name, [], keys, {"iou": values_V[None]}, []), True)
+        for name, values_V in (("a", values), ("b", values[::-1]))
+    ]
+    (axis,) = figures.scatter(models[1], models[0]).axes
+    dots_O2 = axis.collections[0].get_offsets()
+    np.testing.assert_allclose(dots_O2[:, 0], values.reshape(5000, 16).mean(axis=1))
+    np.testing.assert_allclose(dots_O2[:, 1], values[::-1].reshape(5000, 16).mean(axis=1))
 
 
 def test_folders_that_hold_no_evaluation(tmp_path, views):
