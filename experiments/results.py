@@ -25,9 +25,11 @@ from experiments.runs import (
     RECIPE,
     REPEATED,
     RUNS,
+    SEEDS,
     SURFACES,
     TWIN,
     WHOLE,
+    WHOLE_SEEDS,
     load,
     rows_of,
     runs_of,
@@ -69,18 +71,30 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
         ),
     },
     "experiments/seeds_10k/README.md": {
-        "seeds": run_tables.seeds,
+        "seeds": partial(run_tables.seeds, SEEDS),
         "over_mono_seeds": partial(
             run_tables.over_seeds,
+            SEEDS,
             MONO,
-            [name for name in REPEATED if name != MONO],
+            [name for name in REPEATED[SEEDS] if name != MONO],
             ("iou", "iou_unrotated", "handle_recall"),
         ),
         "pair": partial(
             run_tables.over_seeds,
+            SEEDS,
             TWIN,
             ["plane_sweep_guided"],
             ("iou", "recall_2_visible", "recall_2_occluded", "handle_recall"),
+        ),
+    },
+    "experiments/seeds_40k/README.md": {
+        "seeds": partial(run_tables.seeds, WHOLE_SEEDS),
+        "over_mono_seeds": partial(
+            run_tables.over_seeds,
+            WHOLE_SEEDS,
+            MONO,
+            [name for name in REPEATED[WHOLE_SEEDS] if name != MONO],
+            ("iou", "iou_unrotated", "handle_recall"),
         ),
     },
     "experiments/field/README.md": {
@@ -182,21 +196,22 @@ def summary() -> dict[str, Any]:
             if mono in RUNS and folder != mono:
                 run[where]["over mono_scratch"] = _differences([folder], [mono], where)
         runs[str(folder.relative_to(HERE))] = run
-    runs["seeds"] = {
-        name: {
-            where: {
-                "metrics": _differences(folders, [], where),
-                **{
-                    f"over {other}": _differences(folders, REPEATED[other], where)
-                    for other in (MONO, TWIN)
-                    if other != name
-                },
+    for family, repeated in REPEATED.items():
+        runs[family.name] = {
+            name: {
+                where: {
+                    "metrics": _differences(folders, [], where),
+                    **{
+                        f"over {other}": _differences(folders, repeated[other], where)
+                        for other in (MONO, TWIN)
+                        if other != name and other in repeated
+                    },
+                }
+                for where in ("test", "real")
             }
-            for where in ("test", "real")
+            for name, folders in repeated.items()
+            if name != MONO
         }
-        for name, folders in REPEATED.items()
-        if name != MONO
-    }
     return runs
 
 

@@ -162,8 +162,8 @@ def distances() -> str:
     return cells.table(head, rows)
 
 
-def seeds() -> str:
-    """What the recipe reaches from one seed and another."""
+def seeds(family: Path) -> str:
+    """What the runs that a family repeats reach from one seed and another."""
     head = (
         "model",
         "seed",
@@ -173,7 +173,7 @@ def seeds() -> str:
         "real `iou`",
     )
     rows = []
-    for name, folders in REPEATED.items():
+    for name, folders in REPEATED[family].items():
         for seed, folder in enumerate(folders):
             test, real = (metrics_of(folder, where) for where in ("test", "real"))
             rows.append(
@@ -189,9 +189,9 @@ def seeds() -> str:
     return cells.table(head, rows)
 
 
-def over_seeds(base: str, names: Sequence[str], metrics: Sequence[str]) -> str:
+def over_seeds(family: Path, base: str, names: Sequence[str], metrics: Sequence[str]) -> str:
     """What repeated models have over one of them, over objects and seeds."""
-    results = load(HERE / "results.json")["seeds"]
+    results = load(HERE / "results.json")[family.name]
     rows = []
     for name in names:
         for where in ("test", "real"):

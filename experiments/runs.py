@@ -7,7 +7,7 @@ from typing import Any
 
 HERE = Path(__file__).parent
 FLOORS = HERE / "floors"
-SHORT, RECIPE, LONGER, WHOLE, FREE, FREE_WHOLE, SEEDS, FIELD, SURFACES, DISTANCES = (
+SHORT, RECIPE, LONGER, WHOLE, FREE, FREE_WHOLE, SEEDS, WHOLE_SEEDS, FIELD, SURFACES, DISTANCES = (
     HERE / name
     for name in (
         "laptop_4k",
@@ -17,6 +17,7 @@ SHORT, RECIPE, LONGER, WHOLE, FREE, FREE_WHOLE, SEEDS, FIELD, SURFACES, DISTANCE
         "free_10k",
         "free_40k",
         "seeds_10k",
+        "seeds_40k",
         "field",
         "field_surfaces",
         "field_distance",
@@ -54,10 +55,13 @@ RUNS = {
 }
 MONO = "mono_scratch"
 TWIN = "plane_sweep_guided_left"
-#: Runs of the recipe trained again from other seeds: by name, each training of it.
+#: Runs trained again from other seeds: by family of the others and name, each training of it, seed 0 first.
 REPEATED = {
-    name: [RECIPE / name, *(SEEDS / f"{name}_{seed}" for seed in seeds)]
-    for name, seeds in ((MONO, (1, 2)), ("stereo", (1, 2)), (TWIN, (1,)), ("plane_sweep_guided", (1, 2)))
+    others: {name: [first / name, *(others / f"{name}_{seed}" for seed in seeds)] for name, seeds in names}
+    for others, first, names in (
+        (SEEDS, RECIPE, ((MONO, (1, 2)), ("stereo", (1, 2)), (TWIN, (1,)), ("plane_sweep_guided", (1, 2)))),
+        (WHOLE_SEEDS, WHOLE, ((MONO, (1,)), ("stereo", ()), ("plane_sweep_guided", ()))),
+    )
 }
 CATEGORIES = ("mug", "bowl", "bottle")
 
