@@ -72,13 +72,7 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
     },
     "experiments/seeds_10k/README.md": {
         "seeds": partial(run_tables.seeds, SEEDS),
-        "over_mono_seeds": partial(
-            run_tables.over_seeds,
-            SEEDS,
-            MONO,
-            [name for name in REPEATED[SEEDS] if name != MONO],
-            ("iou", "iou_unrotated", "handle_recall"),
-        ),
+        "over_mono_seeds": partial(run_tables.over_mono_seeds, SEEDS),
         "pair": partial(
             run_tables.over_seeds,
             SEEDS,
@@ -89,13 +83,7 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
     },
     "experiments/seeds_40k/README.md": {
         "seeds": partial(run_tables.seeds, WHOLE_SEEDS),
-        "over_mono_seeds": partial(
-            run_tables.over_seeds,
-            WHOLE_SEEDS,
-            MONO,
-            [name for name in REPEATED[WHOLE_SEEDS] if name != MONO],
-            ("iou", "iou_unrotated", "handle_recall"),
-        ),
+        "over_mono_seeds": partial(run_tables.over_mono_seeds, WHOLE_SEEDS),
     },
     "experiments/field/README.md": {
         "field": run_tables.field,

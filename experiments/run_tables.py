@@ -189,6 +189,12 @@ def seeds(family: Path) -> str:
     return cells.table(head, rows)
 
 
+def over_mono_seeds(family: Path) -> str:
+    """What the repeated models of a family have over mono."""
+    names = [name for name in REPEATED[family] if name != MONO]
+    return over_seeds(family, MONO, names, ("iou", "iou_unrotated", "handle_recall"))
+
+
 def over_seeds(family: Path, base: str, names: Sequence[str], metrics: Sequence[str]) -> str:
     """What repeated models have over one of them, over objects and seeds."""
     results = load(HERE / "results.json")[family.name]

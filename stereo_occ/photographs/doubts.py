@@ -8,7 +8,7 @@ import numpy as np
 from stereo_occ.calibration import RealPair
 from stereo_occ.data.rigs import RectifiedRigConfig
 from stereo_occ.geometry.crop import Box
-from stereo_occ.photographs.framing import Framing
+from stereo_occ.photographs.framing import Framing, cube_center
 from stereo_occ.photographs.locate import Found
 from stereo_occ.photographs.match import SIDES
 
@@ -38,7 +38,7 @@ def doubts(
 
 
 def _unlike_training(pair: RealPair, framing: Framing, config: RectifiedRigConfig) -> Iterator[str]:
-    center_3 = np.linalg.inv(framing.cube_from_left)[:3, 3]
+    center_3 = cube_center(framing.cube_from_left)
     middle_3 = (pair.left.center_3 + pair.right.center_3) / 2
     camera = framing.whole.left
     fov_deg = 2 * degrees(atan(camera.width / 2 / camera.K[0, 0]))

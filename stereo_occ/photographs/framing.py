@@ -103,7 +103,7 @@ def frame_on_object(
     left, right = boxes
     cube = working_cube(rig, (left, right), side, fill, margin)
     if center_3 is not None or size is not None:
-        where_3 = _cube_center(cube.cube_from_source) if center_3 is None else center_3
+        where_3 = cube_center(cube.cube_from_source) if center_3 is None else center_3
         unit = cube.unit if size is None else fill * size
         cube = cube_at(rig, (left, right), side, where_3, unit, margin)
     cameras = tuple(crop.camera(camera) for crop, camera in zip(cube.crops, rig.cameras, strict=True))
@@ -183,5 +183,6 @@ def _ball_box(camera: Camera, center_3: NDArray[np.float64], size: float) -> Box
     return Box(u - reach, v - reach, u + reach, v + reach)
 
 
-def _cube_center(cube_from_source: NDArray[np.float64]) -> NDArray[np.float64]:
+def cube_center(cube_from_source: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of the similarity's cube ``(3,)``, in the frame that it leads from."""
     return np.asarray(np.linalg.solve(cube_from_source[:3, :3], -cube_from_source[:3, 3]))

@@ -29,9 +29,11 @@ def unread(path: Path) -> str:
 
 
 def _scene(path: Path) -> dict[str, Any]:
-    content = path.read_bytes()
-    if content[:4] == b"glTF":  # header of 12 bytes, length and kind of the first chunk
-        content = content[20 : 20 + int.from_bytes(content[12:16], "little")]
+    with path.open("rb") as file:
+        head = file.read(20)
+        # Binary files begin with 12 bytes, length and kind of the first chunk; their buffers are the next.
+        binary = head[:4] == b"glTF"
+        content = file.read(int.from_bytes(head[12:16], "little")) if binary else head + file.read()
     scene: dict[str, Any] = json.loads(content)
     return scene
 

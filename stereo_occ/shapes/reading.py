@@ -134,12 +134,16 @@ def read_mesh(path: Path, root: Path, colors: bool) -> RawMesh:
     file_type = path.suffix.lower().removeprefix(".")
     if file_type not in trimesh.available_formats():
         raise UserError(f"reading {path.suffix} files needs pycollada: pip install 'pycollada>=0.8'")
+    try:
+        reason = fault_of(path) or (unread(path) if file_type in ("glb", "gltf") else "")
+    except OSError as error:
+        raise UserError(f"cannot be read: {_words(error)}") from error
+    if reason:
+        raise UserError(reason)
     side_files = SideFiles(path, root)
     lost: tuple[str, ...] = ()
     for with_colors in (True, False) if colors else (False,):  # its pictures may be what is broken
         try:
-            if reason := fault_of(path) or (unread(path) if file_type in ("glb", "gltf") else ""):
-                raise UserError(reason)
             mesh, found = _read(path, side_files, with_colors)
         except (UserError, MemoryError):
             raise
