@@ -4,6 +4,9 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 here="experiments/$family" runs="outputs/$family"
 export OMP_NUM_THREADS=1
 
+# The real objects with their own colours, standing: some of the files have +Z up.
+standing=(data=meshes data.root="${REAL:-}" data.table=experiments/real_objects/objects.csv texture=own)
+
 fit() { # folder of the run, overrides
     local run=$1; shift
     .venv/bin/python -m stereo_occ.train experiment=recipe scale=laptop trainer.threads=1 validation.interval="$interval" \

@@ -37,7 +37,7 @@ def write_quality_report(folder: Path, records: Sequence[MeshRecord], root: Path
     """Write ``quality.csv`` and ``quality.png`` (``quality_2.png``, ... where there are more than fit).
 
     The table has a row for each mesh file with its status, repair or reason, and all figures. A cell of the sheet has
-    a picture and a section through the middle across X, solid black.
+    a picture of the mesh, turned upright, and a section through the middle across X, solid black.
 
     Raises:
         UserError: the files cannot be written or OpenGL cannot be started.
@@ -60,7 +60,7 @@ def write_quality_report(folder: Path, records: Sequence[MeshRecord], root: Path
 
 def _write_table(path: Path, records: Sequence[MeshRecord], root: Path) -> None:
     figures = sorted({name for record in records for name in record.outcome.measures})
-    head = ["file", "category", "name", "subset", "status", "repair", "lost", "reason"]
+    head = ["file", "category", "name", "subset", "up", "status", "repair", "lost", "reason"]
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, [*head, *figures], restval="")
     writer.writeheader()
@@ -69,6 +69,7 @@ def _write_table(path: Path, records: Sequence[MeshRecord], root: Path) -> None:
         names = (mesh_file.path.relative_to(root).as_posix(), mesh_file.category, mesh_file.object_id)
         texts = (
             mesh_file.subset,
+            mesh_file.up.value,
             outcome.status,
             "; ".join(outcome.steps),
             "; ".join(outcome.lost),
@@ -96,7 +97,7 @@ def _page(records: Sequence[MeshRecord], header: str, bar: "tqdm[Any]") -> Image
         x, y = MARGIN + column * CELL_WIDTH, HEADER + row * CELL_HEIGHT
         outcome = record.load()
         if outcome.mesh is not None and np.ptp(outcome.mesh.bounds, axis=0).any():
-            mesh = outcome.mesh.apply_transform(np.linalg.inv(file_from_object(outcome.mesh)))
+            mesh = outcome.mesh.apply_transform(np.linalg.inv(file_from_object(outcome.mesh, record.file.up)))
             sheet.paste(_photograph(mesh), (x, y))
             if mesh.is_volume:
                 sheet.paste(_section(mesh), (x + PANEL_SIDE, y))

@@ -2,15 +2,14 @@
 # One threshold for all pairs against one for each, of the weights for photographs and of the guided plane sweep on the
 # recipe: on validation objects and, with REAL=DIR, on real ones. Nothing is trained. Results go beside this file.
 set -euo pipefail
-cd "$(dirname "$0")/../.."
-export OMP_NUM_THREADS=1
+family=decision
+source "$(dirname "$0")/../family.sh"
 measure() { .venv/bin/python -m experiments.decision.measure "$@" views=4 trainer.threads=1 workers=1; }
 
 guided=outputs/recipe_10k/plane_sweep_guided/best.ckpt field=outputs/field/best.ckpt
 measure recipe_val $guided val
 measure field_val $field val
 if [ -n "${REAL:-}" ]; then
-    real=(all data=meshes data.root="$REAL")
-    measure recipe_real $guided "${real[@]}" data.views=16
-    measure field_real $field "${real[@]}" data.views=4 texture=own rig=zed_mini
+    measure recipe_real $guided all data=meshes data.root="$REAL" data.views=16
+    measure field_real $field all "${standing[@]}" data.views=4 rig=zed_mini
 fi

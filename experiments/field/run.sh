@@ -24,11 +24,11 @@ train "$runs" steps=7000 init="${runs}_second/best.ckpt" optimizer.lr=5e-4 data.
     'scale.counts={mug: 700, bowl: 250, bottle: 300}' scale.views=20
 measure test
 if [ -n "${REAL:-}" ]; then
-    measure real data=meshes data.root="$REAL" data.views=4 texture=own
+    measure real "${standing[@]}" data.views=4
     for rig in zed_mini realsense_d435; do
-        measure $rig data=meshes data.root="$REAL" data.views=4 texture=own rig=$rig
+        measure $rig "${standing[@]}" data.views=4 rig=$rig
     done
-    measure photographs data=meshes data.root="$REAL" data.views=4 texture=own rig=zed_mini background=photographs
+    measure photographs "${standing[@]}" data.views=4 rig=zed_mini background=photographs
     before=outputs/field_before/zed_mini_best
     judge $before checkpoint="${runs}_second/best.ckpt" views=4 data=meshes data.root="$REAL" data.views=4 texture=own rig=zed_mini \
         lights=room sensor=noisy 'sensor.exposure=[-0.5,1.5]'

@@ -8,7 +8,7 @@ source "$(dirname "$0")/../family.sh"
 distances="0.35 0.5 0.7 1.0" baselines="0.063 0.12"
 for distance in $distances; do
     for baseline in $baselines; do
-        judge "$runs/${baseline}_$distance" checkpoint=field data=meshes data.root="$REAL" data.views=2 texture=own \
+        judge "$runs/${baseline}_$distance" checkpoint=field "${standing[@]}" data.views=2 \
             rig=zed_mini "rig.baseline=[$baseline,$baseline]" "rig.distance=[$distance,$distance]" views=2 keep=false workers=1
     done
 done

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from experiments.path_traced.real_objects import upright
+from experiments.path_traced.real_objects import own
 from experiments.whole_pairs import Photographs
 from stereo_occ.calibration import read_calibration
 from stereo_occ.data.objects import ObjectSource
@@ -79,6 +79,6 @@ def _read(folder: Path, source: ObjectSource) -> tuple[str, Photographs]:
         np.stack([np.asarray(Image.open(folder / f"{side}_mask.png"), bool) for side in SIDES]),
         read_calibration(folder / "pair.json"),
         np.array(facts["left_from_object"]),
-        upright(source).mesh,
+        own(source).mesh,
     )
     return facts["look"], photographs

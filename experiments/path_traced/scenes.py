@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from experiments.path_traced.arrangement import arranged
-from experiments.path_traced.real_objects import upright
+from experiments.path_traced.real_objects import own
 from experiments.path_traced.room import Light, draw_room
 from experiments.path_traced.surfaces import Surface, glaze, own_colors
 from experiments.path_traced.things import DIAGONALS, Thing, standing
@@ -56,7 +56,7 @@ class Scene:
 def draw_scene(sources: Sequence[ObjectSource], number: int, view: int) -> Scene:
     """The scene of an object's view; every part of it is drawn from a generator of its own."""
     rngs = [np.random.default_rng([number, view, stream]) for stream in range(5)]
-    shape = upright(sources[number])
+    shape = own(sources[number])
     diagonal = float(rngs[0].uniform(*DIAGONALS[shape.category]))
     pose = standing(shape, diagonal, float(rngs[0].uniform(0, 2 * pi)))
     hull_N3 = transform_points(np.asarray(shape.mesh.convex_hull.vertices), pose)

@@ -5,6 +5,8 @@ from enum import Enum
 
 from omegaconf import MISSING
 
+from stereo_occ.shapes.layouts import UpAxis
+
 
 class SplitKind(Enum):
     """What is held out."""
@@ -58,6 +60,7 @@ class MeshesConfig(MeshFilesConfig):
 
     name: str = "meshes"
     table: str | None = None  # CSV file with columns file and category; null: folders named after categories
+    up: UpAxis = UpAxis.y  # of the files' axes; a table can say it of each
 
 
 @dataclass
@@ -72,4 +75,4 @@ DATA_SCHEMAS: dict[str, type[DataConfig]] = {
 }
 
 #: How a data set is found and read changes which objects there are, not what a shard holds.
-NOT_CONTENT = ("counts", "split", "fractions", "table", "colors", "time_limit", "memory_limit")
+NOT_CONTENT = ("counts", "split", "fractions", "table", "up", "colors", "time_limit", "memory_limit")

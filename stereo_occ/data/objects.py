@@ -10,7 +10,7 @@ from stereo_occ.data.config import MeshesConfig, MeshFilesConfig, ProceduralConf
 from stereo_occ.data.meshes import MeshRecord, inspect_files, without_copies
 from stereo_occ.data.splits import split_objects
 from stereo_occ.errors import UserError
-from stereo_occ.shapes.layouts import Listing, Skipped, list_folder, list_table
+from stereo_occ.shapes.layouts import Listing, Skipped, UpAxis, list_folder, list_table
 from stereo_occ.shapes.mesh_cache import MeshCache
 from stereo_occ.shapes.procedural import procedural_shape
 from stereo_occ.shapes.shape import Shape
@@ -107,7 +107,7 @@ def list_objects(pairs: PairsConfig, progress: bool) -> Objects:
             record.file.category,
             record.file.object_id,
             record.shape,
-            version=f"_{record.outcome.checksum}",
+            version=_version(record),
             solid=f"_{record.outcome.solid}",
             subset=record.file.subset,
         )
@@ -153,9 +153,14 @@ def training_objects(objects: Sequence[ObjectSource], pairs: PairsConfig) -> dic
     }
 
 
+def _version(record: MeshRecord) -> str:
+    turned = "" if record.file.up is UpAxis.y else f"_{record.file.up.value}"
+    return f"_{record.outcome.checksum}{turned}"
+
+
 def _listing(data: MeshFilesConfig) -> Listing:
     root = Path(data.root)
     if isinstance(data, ShapeNetConfig):
         return list_shapenet(root)
     assert isinstance(data, MeshesConfig)
-    return list_folder(root) if data.table is None else list_table(root, Path(data.table))
+    return list_folder(root, data.up) if data.table is None else list_table(root, Path(data.table), data.up)

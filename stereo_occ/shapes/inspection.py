@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 from trimesh import Trimesh
 
 from stereo_occ.errors import UserError
-from stereo_occ.shapes.layouts import MeshFile
+from stereo_occ.shapes.layouts import MeshFile, UpAxis
 from stereo_occ.shapes.reading import read_mesh
 from stereo_occ.shapes.repair import repair
 from stereo_occ.shapes.shape import Fact, Shape
+
+#: From a frame with +Z up to the object frame's axes, +Y up: a quarter turn about X.
+TURNS = {UpAxis.y: np.eye(3), UpAxis.z: np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])}
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,19 +53,22 @@ class Inspection:
         return "rejected" if self.reason else "repaired" if self.steps else "clean"
 
     def shape(self, file: MeshFile) -> Shape:
-        """The object, its facts among them the 4x4 matrix ``file_from_object`` back to the file's own frame."""
+        """The object, upright; of its facts, ``file_from_object`` is the 4x4 matrix back to the file's own frame."""
         assert self.mesh is not None
         assert not self.reason
+        turn = np.eye(4)
+        turn[:3, :3] = TURNS[file.up]
+        mesh = self.mesh.copy().apply_transform(turn)
         facts: dict[str, Fact] = {
             "file": file.path.name,
             "status": self.status,
             "repair": "; ".join(self.steps),
             "faces": len(self.mesh.faces),
             "bodies": self.mesh.body_count,
-            "file_from_object": file_from_object(self.mesh).tolist(),
+            "file_from_object": file_from_object(self.mesh, file.up).tolist(),
             **self.measures,
         }
-        return Shape(file.category, file.object_id, self.mesh, facts=facts, colors=self.colors).normalized()
+        return Shape(file.category, file.object_id, mesh, facts=facts, colors=self.colors).normalized()
 
 
 def inspect_mesh(path: Path, root: Path, colors: bool) -> Inspection:
@@ -104,11 +110,11 @@ def inspect_mesh(path: Path, root: Path, colors: bool) -> Inspection:
     )
 
 
-def file_from_object(mesh: Trimesh) -> NDArray[np.float64]:
-    """The similarity (4, 4) from the object frame to that of the mesh: scale by its diagonal, then move."""
+def file_from_object(mesh: Trimesh, up: UpAxis) -> NDArray[np.float64]:
+    """The similarity (4, 4) from the object frame to that of the mesh: scale by its diagonal, turn, then move."""
     low_3, high_3 = mesh.bounds
     matrix = np.eye(4)
-    matrix[:3, :3] *= np.linalg.norm(high_3 - low_3)
+    matrix[:3, :3] = TURNS[up].T * np.linalg.norm(high_3 - low_3)
     matrix[:3, 3] = (low_3 + high_3) / 2
     return matrix
 

@@ -4,6 +4,7 @@ import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
+from enum import Enum
 from pathlib import Path, PurePath
 
 from stereo_occ.errors import UserError
@@ -20,10 +21,17 @@ LAYOUT = (
     f"and one of {', '.join(SUFFIXES)}"
 )
 
-COLUMNS = "file (relative to data.root), category, and if you like name and subset"
+COLUMNS = "file (relative to data.root), category, and if you like name, subset and up"
 
 #: File names that say nothing of the object: its folder's name does.
 PLAIN_STEMS = ("model", "models", "model_normalized")
+
+
+class UpAxis(Enum):
+    """The axis of a file's frame that points up when the object stands."""
+
+    y = "y"  # of glTF, and of most models made to be looked at
+    z = "z"  # of URDF and most scans
 
 
 @dataclass(frozen=True)
@@ -39,6 +47,7 @@ class MeshFile:
     category: str
     object_id: str
     subset: str = ""
+    up: UpAxis = UpAxis.y
 
 
 @dataclass(frozen=True)
@@ -66,7 +75,7 @@ class Listing:
     skipped: list[Skipped]
 
 
-def list_folder(root: Path) -> Listing:
+def list_folder(root: Path, up: UpAxis = UpAxis.y) -> Listing:
     """The files of a folder laid out as ``category/name/model.*`` or ``category/name.*``, or both.
 
     A folder with a single mesh may call it as it likes.
@@ -96,18 +105,19 @@ def list_folder(root: Path) -> Listing:
                 skipped.append(_skipped(entry, name, folder.name, str(error)))
             else:
                 taken.add(name)
-                files.append(MeshFile(path, folder.name, name))
+                files.append(MeshFile(path, folder.name, name, up=up))
     return Listing(files, skipped)
 
 
-def list_table(root: Path, table: Path) -> Listing:
-    """The files that a CSV file names: columns ``file`` and ``category``, optionally ``name`` and ``subset``.
+def list_table(root: Path, table: Path, up: UpAxis = UpAxis.y) -> Listing:
+    """The files that a CSV file names: columns ``file`` and ``category``, optionally ``name``, ``subset`` and ``up``.
 
     Without a name it is the file's, or its folder's where the file is called ``model.*``. Where there is a column
-    ``subset``, rows that leave it empty are skipped.
+    ``subset``, rows that leave it empty are skipped; where ``up`` is empty, it is the argument.
 
     Raises:
-        UserError: the table cannot be read, or a row leads out of ``root``, repeats a name or names an unknown subset.
+        UserError: the table cannot be read, or a row leads out of ``root``, repeats a name or names an unknown subset
+            or axis.
     """
     where = f"data.table={table}"
     files: dict[tuple[str, str], MeshFile] = {}
@@ -117,7 +127,12 @@ def list_table(root: Path, table: Path) -> Listing:
         name = row.get("name") or _name(PurePath(row["file"]))
         path = root / _inside(row["file"], f"{where}, row {number}")
         subset = row.get("subset")
-        file = MeshFile(path, row["category"], name, subset or "")
+        axis = row.get("up") or up.value
+        if axis not in UpAxis.__members__:
+            raise UserError(
+                f"{where}, row {number}: up={axis!r} must be {' or '.join(UpAxis.__members__)}, or empty"
+            )
+        file = MeshFile(path, row["category"], name, subset or "", UpAxis[axis])
         if _hidden(PurePath(name)) or not name.isprintable() or "/" in name or "\\" in name:
             raise UserError(
                 f"{where}, row {number}: name {name!r} cannot be part of a file name; choose another"

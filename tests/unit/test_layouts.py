@@ -6,7 +6,7 @@ import pytest
 from mesh_files import box, put
 
 from stereo_occ.errors import UserError
-from stereo_occ.shapes.layouts import list_folder, list_table
+from stereo_occ.shapes.layouts import UpAxis, list_folder, list_table
 
 
 def names(listing):
@@ -106,6 +106,16 @@ def test_a_table_may_divide_the_objects(tmp_path):
     assert reasons(listing) == {"d": "is in no subset"}
 
 
+def test_a_table_may_say_which_axis_is_up(tmp_path):
+    rows = "file,category,up\n"
+    for name, axis in (("a", "z"), ("b", "y"), ("c", "")):
+        put(box(1, 1, 1), tmp_path, f"{name}.stl")
+        rows += f"{name}.stl,mug,{axis}\n"
+    for up in UpAxis:
+        listing = list_table(tmp_path, table(tmp_path, rows), up)
+        assert [file.up for file in listing.files] == [UpAxis.z, UpAxis.y, up]
+
+
 def test_rows_that_give_no_object_are_skipped(tmp_path):
     put(box(1, 1, 1), tmp_path, "a.stl")
     (tmp_path / "a.txt").write_text("not a mesh")
@@ -138,6 +148,7 @@ def test_a_table_cannot_lead_out_of_the_folder(tmp_path, file):
             "file,category,subset\na.stl,mug,training\n",
             "row 2: subset='training' must be one of train, val, test",
         ),
+        ("file,category,up\na.stl,mug,x\n", "row 2: up='x' must be y or z, or empty"),
         ("file,category,name\na.stl,mug,../b\n", r"row 2: name '\.\./b' cannot be part of a file name"),
         ("file,category,name\na.stl,mug,.b\n", r"row 2: name '\.b' cannot be"),
     ],

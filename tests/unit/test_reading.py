@@ -9,11 +9,12 @@ import trimesh
 from mesh_files import box, put, shapes_of
 from PIL import Image
 from samples import single_line
+from scipy.spatial import cKDTree
 
 from stereo_occ.errors import UserError
 from stereo_occ.shapes import gltf as gltf_module
 from stereo_occ.shapes.inspection import inspect_mesh
-from stereo_occ.shapes.layouts import list_folder
+from stereo_occ.shapes.layouts import UpAxis, list_folder
 from stereo_occ.shapes.mesh_cache import MeshCache, load
 from stereo_occ.shapes.reading import read_mesh
 
@@ -47,6 +48,17 @@ def test_the_way_back_to_the_files_own_frame_is_kept(tmp_path, place):
     back = shape.mesh.copy().apply_transform(np.array(shape.facts["file_from_object"]))
     np.testing.assert_allclose(back.bounds, mesh.bounds, rtol=1e-6)
     assert back.volume == pytest.approx(mesh.volume, rel=1e-5)
+
+
+def test_an_object_of_a_file_with_z_up_stands_and_knows_the_way_back(tmp_path):
+    cone = trimesh.creation.cone(radius=0.5, height=3)  # its tip at +Z
+    put(cone.apply_translation([4, 5, 6]), tmp_path, "bottle/cone.stl")
+    (shape,), _ = shapes_of(tmp_path, list_folder(tmp_path, UpAxis.z))
+    assert shape.mesh.extents.argmax() == 1
+    assert shape.mesh.center_mass[1] < 0, "the base is below, where most of the volume is"
+    assert shape.mesh.volume == pytest.approx(cone.volume / np.linalg.norm(cone.extents) ** 3, rel=1e-5)
+    back = shape.mesh.copy().apply_transform(np.array(shape.facts["file_from_object"]))
+    assert cKDTree(back.vertices).query(cone.vertices)[0].max() < 1e-5
 
 
 def test_vertices_split_by_normals_and_texture_coordinates_are_merged(tmp_path):
