@@ -78,6 +78,15 @@ def test_points_are_where_the_images_show_them(turn):
 
 
 @pytest.mark.parametrize("turn", TURNS.values(), ids=TURNS)
+def test_pixels_that_are_no_rectangles_turn_with_the_rest(turn):
+    batch = batch_of(4)
+    K_B233 = batch.views.K_B233.clone()
+    K_B233[..., 0, 1] = 12.0
+    batch = drawn(replace(batch, views=replace(batch.views, K_B233=K_B233)))
+    assert_points_are_where_they_are_shown(turn(batch))
+
+
+@pytest.mark.parametrize("turn", TURNS.values(), ids=TURNS)
 def test_cameras_stay_cameras_and_labels_stay_with_their_points(turn):
     before = batch_of(4)
     after = turn(before)

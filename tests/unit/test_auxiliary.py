@@ -36,17 +36,17 @@ def batch_of(mask_B2HW, depth_B2HW):
 
 @pytest.fixture
 def batch():
-    """Two pairs; only the right image of the second shows something: in two cells, one of them half."""
+    """Two pairs; only the right image of the first shows something: in two cells, one of them half."""
     mask, depth = torch.zeros(2, 2, 8, 8), torch.zeros(2, 2, 8, 8)
-    mask[1, 1, :4, :6] = 1
-    depth[1, 1, :4, :4], depth[1, 1, :4, 4:6] = 1.4, 1.7
+    mask[0, 1, :4, :6] = 1
+    depth[0, 1, :4, :4], depth[0, 1, :4, 4:6] = 1.4, 1.7
     return batch_of(mask, depth)
 
 
 def test_the_best_answer_costs_nothing(batch):
     logits, depth = torch.full((4, 2, 2), -50.0), torch.full((4, 2, 2), 9.0)  # the background's depth is free
-    logits[3, 0] = torch.tensor([50.0, 0.0])
-    depth[3, 0] = torch.tensor([-0.1, 0.2])
+    logits[2, 0] = torch.tensor([50.0, 0.0])  # both left images, then both right ones
+    depth[2, 0] = torch.tensor([-0.1, 0.2])
     losses = auxiliary_losses(Fixed(logits, depth), torch.zeros(4, 4, 2, 2), batch)
     torch.testing.assert_close(losses["depth"], torch.tensor(0.0), atol=1e-6, rtol=0)
     torch.testing.assert_close(losses["mask"], torch.tensor(2.0).log() / 16)  # the half cell's own entropy

@@ -168,6 +168,14 @@ def test_image_corners_normalize_to_one():
     assert normalize_pixels(corners_N2, 64, 48).tolist() == [[-1, -1], [1, 1]]
 
 
+def test_an_image_of_another_size_shows_the_same_from_edge_to_edge(rig):
+    small = rig.right.resized(SIDE // 2, 3 * SIDE)
+    assert (small.width, small.height) == (SIDE // 2, 3 * SIDE)
+    for point in ([0.1, 0.2, -0.3], [-0.2, 0.05, 0.1]):
+        expected = (pixel_of(rig.right, point) + 0.5) * [0.5, 3] - 0.5
+        np.testing.assert_allclose(pixel_of(small, point), expected)
+
+
 def test_clearance_is_the_distance_to_the_nearest_side_of_the_view():
     """A straight camera at (0, 0, 1) with 60 degrees: its sides are planes at 30 degrees to the axis."""
     camera = Camera(intrinsics(radians(60), SIDE), look_at_origin(0.0, 1.0), SIDE, SIDE)

@@ -54,6 +54,31 @@ def test_depth_is_focal_length_times_baseline_over_disparity():
     assert center_3[2] == pytest.approx(FOCAL * BASELINE / disparity)
 
 
+def test_of_rays_that_pass_each_other_it_is_the_middle_of_their_nearest_points():
+    """At half a metre on both optical axes' rows, one ray goes 10 pixels lower than the other."""
+    row, disparity = (H - 1) / 2, FOCAL * BASELINE / 0.5
+    u = (W - 1) / 2 + disparity / 2
+    center_3 = triangulate(rectified(), ((u, row + 10), (u - disparity, row)))
+    lines = [np.array([disparity / 2, 10, FOCAL]), np.array([-disparity / 2, 0, FOCAL])]
+    starts = [np.zeros(3), np.array([BASELINE, 0, 0])]
+    normal = np.cross(*lines)
+    along = np.linalg.solve(np.stack([lines[0], -lines[1], normal], axis=1), starts[1] - starts[0])
+    ends = [start + t * line for start, t, line in zip(starts, along[:2], lines, strict=True)]
+    np.testing.assert_allclose(center_3, (ends[0] + ends[1]) / 2, atol=1e-12)
+    assert abs(ends[0][1] - ends[1][1]) > 0.003
+
+
+def test_other_cameras_of_the_same_images_are_cut_alike():
+    rig, points_N3 = rectified(), block()
+    cube = working_cube(rig, boxes_of(rig, points_N3), 64)
+    other = rectified(BASELINE + 0.002)
+    cut = cube.cut(other)
+    inside_N3 = transform_points(points_N3, cube.cube_from_source)
+    for whole, crop, camera in zip(other.cameras, cube.crops, cut.cameras, strict=True):
+        expected_N2 = (whole.project(points_N3)[0] - [crop.left, crop.top]) * 64 / crop.extent - 0.5
+        np.testing.assert_allclose(camera.project(inside_N3)[0], expected_N2, atol=1e-9)
+
+
 def test_the_papers_rig_frame_is_the_cube_of_one_metre_about_its_fixation_point():
     rig = toed_in_rig(1.0, pi / 16, pi / 3, 64)
     whole = Box(-0.5, -0.5, 63.5, 63.5)
@@ -143,6 +168,20 @@ def test_the_side_is_known_from_the_picture_alone():
     points_N3 = block(center=(0.0, 0.0, 0.8), half=(0.03, 0.04, 0.0))
     cube = working_cube(rig, boxes_of(rig, points_N3), 64)
     assert cube.unit == pytest.approx(FILL * 0.1, rel=0.01)
+
+
+def test_the_side_of_something_off_the_axis_is_no_larger():
+    """A ball of the same size at the same distance, in the middle of both images and near their corner."""
+    rng = np.random.default_rng(3)
+    ball_N3 = rng.standard_normal((2000, 3))
+    ball_N3 *= 0.05 / np.linalg.norm(ball_N3, axis=1, keepdims=True)
+    direction_3 = np.array([0.45, 0.25, 1.0])
+    units = [
+        working_cube(rectified(), boxes_of(rectified(), ball_N3 + center_3), 64).unit
+        for center_3 in ([0.0, 0.0, 0.8], 0.8 * direction_3 / np.linalg.norm(direction_3))
+    ]
+    assert units[1] == pytest.approx(units[0], rel=0.06)
+    assert units[0] == pytest.approx(FILL * 0.1 * np.sqrt(2), rel=0.01)
 
 
 def test_swapped_images_are_refused():

@@ -59,6 +59,12 @@ def test_counts_of_two_views_are_those_of_their_points_together():
         assert recall == pytest.approx(hits / float(occupied.sum()))
 
 
+def test_recall_is_of_nothing_where_nothing_is_occupied():
+    precision_K, recall_K = precision_recall_curve(counts([2.0, -2.0], [False, False]))
+    assert np.isnan(recall_K).all()
+    assert precision_K[0] == 0
+
+
 def test_a_failed_view_is_sure_and_wrong():
     empty_K, occupied_K = counts([np.nan, 5.0, -5.0], [True, True, False])
     assert (occupied_K[0], empty_K[-1]) == (2, 1)

@@ -11,7 +11,7 @@ from samples import POOL, SIDE, small_shard
 from scipy.spatial import cKDTree
 
 from stereo_occ.config import QueriesConfig
-from stereo_occ.data.batch import Batch, map_tensors
+from stereo_occ.data.batch import Batch, ViewId, map_tensors
 from stereo_occ.data.controls import ControlConfig
 from stereo_occ.data.dataset import DealtBatches, Draw, EvaluationPairs, ShuffledBatches, TrainingPairs
 from stereo_occ.data.examples import examples
@@ -66,6 +66,11 @@ def test_processes_share_every_batch():
         ShuffledBatches(10, 6, 12, 0, place=(0, 4))
 
 
+def test_processes_that_continue_share_the_batches_that_are_left():
+    parts = [list(ShuffledBatches(10, 6, 12, 0, 5, place=(rank, 2))) for rank in range(2)]
+    assert [list(chain(*both)) for both in zip(*parts, strict=True)] == order(batch_size=6)[5:]
+
+
 @pytest.mark.parametrize("items", [1, 3, 4, 5, 8, 11])
 @pytest.mark.parametrize("processes", [1, 2, 3])
 def test_evaluation_is_dealt_out_whole(items, processes):
@@ -115,6 +120,19 @@ def test_the_points_of_a_view_are_new_each_time_it_comes(shards):
     assert not torch.equal(*batch.queries["train"].points_BN3)
     other_seed = TrainingPairs(shards, range(3), BOX_ONLY, 64, seed=1).__getitems__([Draw(4, 0)])
     assert not torch.equal(other_seed.queries["train"].points_BN3[0], batch.queries["train"].points_BN3[0])
+
+
+def test_the_points_of_an_evaluation_are_those_of_every_earlier_one(shards):
+    """The results of this repository were measured on points drawn like these."""
+    batch = EvaluationPairs(shards, range(3), 4).__getitems__([4])
+    assert batch.ids == [ViewId("mug", "b", 1)]
+    expected = [
+        [-0.3499, 0.2732, 0.0919],
+        [0.3540, -0.1666, -0.0692],
+        [-0.2946, 0.2245, -0.2685],
+        [-0.4830, 0.3418, 0.2717],
+    ]
+    torch.testing.assert_close(batch.queries["cube"].points_BN3[0], torch.tensor(expected), atol=2e-4, rtol=0)
 
 
 def test_items_are_the_views_of_one_object_after_another(shards):

@@ -11,7 +11,7 @@ from stereo_occ.models.grid import Grid, whole_cube
 from stereo_occ.models.light import LightEncoder
 from stereo_occ.models.pixel_stereo import CalibratedMaps
 from stereo_occ.models.plane_sweep import PlaneSweepStereoModel, SweptVolume
-from stereo_occ.models.sampling import sample_volume
+from stereo_occ.models.sampling import Projections, sample_volume
 from stereo_occ.models.unet3d import UNet3d
 
 CHANNELS = 48
@@ -82,6 +82,26 @@ def test_positional_encoding_has_sines_and_cosines_of_each_frequency():
     torch.testing.assert_close(code[:3], points[0, 0])
     angles = torch.pi * torch.tensor([0.5, 1, 0.25, 0.5, -0.125, -0.25])
     torch.testing.assert_close(code[3:], torch.cat([angles.sin(), angles.cos()]))
+
+
+def test_evidence_of_a_point_by_hand():
+    """Two cameras of one channel, and a point that both see: read, placed, rectified, averaged, compared."""
+    evidence = PairEvidence(1, 1, 2, torch.square)
+    with torch.no_grad():
+        evidence.reduce.weight.copy_(torch.tensor([1.0, -1.0]).view(2, 1, 1, 1))
+        evidence.reduce.bias.copy_(torch.tensor([0.5, 0.0]))
+        evidence.place.weight.copy_(torch.tensor([[1.0, 0, 0, 0], [0, 2.0, -1.0, 3.0]]))
+        features = torch.tensor([2.0, -1.0]).view(2, 1, 1, 1, 1).expand(2, 1, 1, 4, 4)
+        offsets = torch.tensor([[0.1, 0.2, 0.3], [-0.4, 0.5, 0.6]]).view(2, 1, 1, 3)
+        depths = torch.tensor([1.0, 2.0]).view(2, 1, 1)
+        points = Projections(torch.zeros(2, 1, 1, 2), torch.ones(2, 1, 1), offsets, depths)
+        found = evidence(features, points)[0, :, 0]
+    left, right = (2.5, -2.0), (-0.5, 1.0)  # read
+    first = (max(left[0] + 0.1, 0) + max(right[0] - 0.4, 0)) / 2
+    second = (max(left[1] + 2 * 0.2 - 0.3, 0) + max(right[1] + 2 * 0.5 - 0.6 + 3 * np.log(2), 0)) / 2
+    correlation = (left[0] * right[0] + left[1] * right[1]) / 2
+    expected = [first, second, correlation, (left[0] - right[0]) ** 2, (left[1] - right[1]) ** 2, 1.0, 1.0]
+    torch.testing.assert_close(found, torch.tensor(expected, dtype=torch.float32))
 
 
 def pair_maps(batch=3, seed=0):
@@ -180,6 +200,26 @@ def test_the_volume_alone_tells_samples_apart():
     torch.testing.assert_close(same[0], other[0])
     torch.testing.assert_close(same[1, :, :-4], other[1, :, :-4])
     torch.testing.assert_close(same[1, :, -4:] + 1, other[1, :, -4:])
+
+
+def test_the_volume_lies_where_the_locator_puts_it():
+    torch.manual_seed(0)
+    encoder = LightEncoder(stride=4, channels=8, widths=[8, 8, 8, 8], blocks=[1, 1, 1, 1])
+    settings = {"views": "both", "groups": 2, "frequencies": 2, "code_size": 8, "hidden": 8, "blocks": 1}
+    model = PlaneSweepStereoModel(encoder, grid=4, around="object", widths=[4, 4], **settings).eval()
+    cube = whole_cube(2, torch.device("cpu"))
+    points = torch.rand(2, 30, 3) - 0.5
+    with torch.no_grad():
+        code = model.encode(random_pairs(2))
+        found = model.locator(model.scout(code.maps, cube))
+        volume = model.unet(model.sweep(code.maps, found))
+        token = model.token(code, points, code.maps.project(points))
+    assert (code.grid.side_B < 0.9).all()
+    torch.testing.assert_close(code.grid.center_B3, found.center_B3)
+    torch.testing.assert_close(code.volume_BCDHW, volume)
+    local = (points - found.center_B3[:, None]) / found.side_B[:, None, None]
+    torch.testing.assert_close(token[..., -7:-3], sample_volume(volume, local).mT)
+    torch.testing.assert_close(token[..., -3:], local.clamp(-1, 1))
 
 
 def test_guidance_teaches_what_finds_the_object_and_the_logits_what_is_in_the_grid():

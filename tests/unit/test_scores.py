@@ -1,5 +1,6 @@
 """IoU of object-views gathered from batches."""
 
+import numpy as np
 import pytest
 import torch
 
@@ -113,3 +114,26 @@ def test_summary_keys_are_those_of_the_protocol():
     scores.update(batch_of(("mug", "a", 0), ("bowl", "b", 0)), logits(RIGHT, RIGHT))
     parts = ("", "/mug", "/bowl", "/all")
     assert set(scores.summary(0.5)) == {metric + part for metric in IOU_OF.values() for part in parts}
+
+
+def test_what_processes_measured_apart_is_what_one_would_have_measured():
+    batches = [
+        (batch_of(("mug", "a", 0), ("bowl", "c", 0)), logits(RIGHT, HALF)),
+        (batch_of(("mug", "b", 0), ("bowl", "d", 0)), logits(WRONG, WRONG)),
+    ]
+    alone, parts = Scores(), [Scores(), Scores()]
+    for part, (batch, answers) in zip(parts, batches, strict=True):
+        alone.update(batch, answers)
+        part.update(batch, answers)
+    parts[0].merge(parts[1:])
+    assert parts[0].summary(0.5) == alone.summary(0.5)
+    assert parts[0].loss() == pytest.approx(alone.loss())
+    assert parts[0].iou_at_half() == alone.iou_at_half() == pytest.approx(0.375)
+
+
+def test_the_loss_is_the_cross_entropy_in_the_box_over_views():
+    scores = Scores()
+    probability = torch.tensor([[0.9, 0.8, 0.2, 0.3]])
+    answers = {name: torch.zeros(1, 4) for name in IOU_OF} | {"bbox": torch.logit(probability)}
+    scores.update(batch_of(("mug", "a", 0)), answers)
+    assert scores.loss() == pytest.approx(-np.log([0.9, 0.8, 0.8, 0.7]).mean(), rel=1e-5)

@@ -1,5 +1,7 @@
 """Lines of sight, the depth found along them, and how far points are said to be behind it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -83,6 +85,13 @@ def test_a_plane_in_the_volume_is_found_along_every_line_of_sight_that_meets_it(
     errors = (found[:, :, 0].flatten(2) - dense[nearest.indices])[meets]
     assert errors.abs().median() < 0.003
     assert errors.abs().max() < 0.02
+
+
+def test_an_untrained_surface_is_what_the_volume_says_whatever_the_pictures_show(rigs):
+    surface, volume, grid = surface_of(), torch.randn(3, 1, 8, 8, 8), whole_cube(3, torch.device("cpu"))
+    blank = maps_of(rigs)
+    busy = replace(blank, features_VBCHW=torch.randn(blank.features_VBCHW.shape))
+    torch.testing.assert_close(surface(volume, grid, blank), surface(volume, grid, busy))
 
 
 def test_where_a_line_of_sight_misses_the_volume_the_answer_is_of_no_place(rigs):

@@ -36,6 +36,13 @@ def test_the_difference_is_a_minus_b_and_macro_the_mean_of_categories():
     assert (result["mug"].low, result["mug"].high) == (0, 1)  # both objects drawn twice
 
 
+def test_every_view_counts_alike_where_objects_have_different_numbers_of_them():
+    a = np.array([[0.8, 0.6, 0.7, 0.1]])
+    row = paired_bootstrap(a, np.zeros((1, 4)), ["mug"] * 4, ["a", "a", "a", "b"], draws=400)["mug"]
+    assert row.difference == pytest.approx(2.2 / 4)
+    assert (row.low, row.high) == pytest.approx((0.1, 0.7))  # one object drawn twice
+
+
 @pytest.mark.parametrize("per_object", [1, 5])
 def test_an_interval_covers_the_truth_as_often_as_it_says(per_object):
     """Whole objects share an effect, so views of one say little more than one view does."""
