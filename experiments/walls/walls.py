@@ -1,11 +1,12 @@
-"""How far off a predicted wall is: the IoU of every test object beside the thickness of its walls.
+"""What thin walls make of an IoU: that of every test object beside the thickness of its walls.
 
     python -m experiments.walls.walls DATA_FOLDER
 
 DATA_FOLDER holds the shards that the models of ``experiments/recipe_10k`` were measured on. A wall of thickness t whose
 prediction, as thick, lies e beside it has an IoU of (t - e) / (t + e), so an IoU of q says e = t (1 - q) / (1 + q). The
-thickness is twice the volume over the area, which for a solid is a measure of its size. Writes ``walls.csv`` and
-``walls.json`` beside this file and draws ``walls.png``.
+thickness is twice the volume over the area, which for a solid is a measure of its size. That e is a shift with the same
+IoU, not a measured one: a wall may also be too thick, or missing. How far surfaces are apart is measured by the Chamfer
+distance, which is put beside it. Writes ``walls.csv`` and ``walls.json`` beside this file and draws ``walls.png``.
 """
 
 import csv
@@ -28,13 +29,14 @@ PIXEL = 2 * tan(radians(30)) / 64  # metres on the plane through the object, at 
 SOLID = 4.0  # pixels; what is thicker is no wall
 
 
-def iou_per_object(model: str) -> dict[tuple[str, str], float]:
-    """Mean over the views of each test object, by category and name."""
+def per_object(model: str, metric: str) -> dict[tuple[str, str], float]:
+    """Mean over the views of each test object that have it, by category and name."""
     values = defaultdict(list)
     path = HERE.parent / "recipe_10k" / model / "test_per_object.csv"
     with path.open(newline="") as file:
         for row in csv.DictReader(file):
-            values[row["category"], row["object_id"]].append(float(row["iou"]))
+            if row[metric]:
+                values[row["category"], row["object_id"]].append(float(row[metric]))
     return {key: float(np.mean(views)) for key, views in values.items()}
 
 
@@ -47,29 +49,35 @@ def thickness(shard: Path) -> float:
 
 
 def offset(pixels_N: np.ndarray, iou_N: np.ndarray) -> float:
-    """Median over objects of how far the wall is off, pixels."""
+    """Median over objects of the shift of a wall that has that IoU, pixels."""
     return float(np.median(pixels_N * (1 - iou_N) / (1 + iou_N)))
 
 
 @dataclass(frozen=True)
 class Objects:
-    """The test objects: category, name, thickness in pixels, and each model's IoU."""
+    """The test objects: category, name, thickness in pixels, and each model's IoU and Chamfer distance in pixels."""
 
     category_N: np.ndarray
     names: list[str]
     pixels_N: np.ndarray
     iou_N: dict[str, np.ndarray]
+    chamfer_N: dict[str, np.ndarray]
 
 
 def read(data: Path) -> Objects:
     """The objects that the models were measured on."""
-    ious = {model: iou_per_object(model) for model in MODELS}
-    keys = sorted(ious["plane_sweep_stereo"])
+    keys = sorted(per_object("plane_sweep_stereo", "iou"))
+
+    def values_N(model: str, metric: str) -> np.ndarray:
+        values = per_object(model, metric)
+        return np.array([values[key] for key in keys])
+
     return Objects(
         np.array([category for category, _ in keys]),
         [name for _, name in keys],
         np.array([thickness(data / category / f"{name}.h5") for category, name in keys]),
-        {model: np.array([values[key] for key in keys]) for model, values in ious.items()},
+        {model: values_N(model, "iou") for model in MODELS},
+        {model: values_N(model, "chamfer_l1") / PIXEL for model in MODELS},
     )
 
 
@@ -84,14 +92,15 @@ def write_table(objects: Objects) -> None:
 
 
 def summary(objects: Objects) -> dict[str, dict[str, float]]:
-    """How far off each model's walls are, and its IoU of walls and of solids."""
+    """Of each model's walls the shift of the same IoU, the Chamfer distance and the IoU, and the IoU of solids."""
     walls_N = objects.pixels_N < SOLID
     found: dict[str, dict[str, float]] = {}
     for model, iou_N in objects.iou_N.items():
-        found[model] = {"wall_off_px": offset(objects.pixels_N[walls_N], iou_N[walls_N])}
+        found[model] = {"shift_px": offset(objects.pixels_N[walls_N], iou_N[walls_N])}
         for category in MARKERS:
             chosen_N = walls_N & (objects.category_N == category)
-            found[model][f"wall_off_px/{category}"] = offset(objects.pixels_N[chosen_N], iou_N[chosen_N])
+            found[model][f"shift_px/{category}"] = offset(objects.pixels_N[chosen_N], iou_N[chosen_N])
+            found[model][f"chamfer_px/{category}"] = float(np.median(objects.chamfer_N[model][chosen_N]))
             found[model][f"iou/{category}"] = float(iou_N[chosen_N].mean())
         found[model]["iou/solid"] = float(iou_N[~walls_N].mean())
     found["objects"] = {"walls": int(walls_N.sum()), "solid": int((~walls_N).sum())}
