@@ -34,7 +34,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.baselines.build import build_baseline
 from stereo_occ.checkpoint import KEY, config_of, plain, read_checkpoint
-from stereo_occ.checks import check_evaluation
+from stereo_occ.checks.evaluation import check_evaluation
 from stereo_occ.cli import compose_config, entry_point
 from stereo_occ.config import EvaluateConfig
 from stereo_occ.errors import UserError

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from omegaconf import DictConfig, OmegaConf
 
-from stereo_occ.checks import check_pairs
+from stereo_occ.checks.pairs import check_pairs
 from stereo_occ.config import EvaluateConfig, TrainConfig
 from stereo_occ.data.config import SplitKind
 from stereo_occ.data.datamodule import PairsDataModule

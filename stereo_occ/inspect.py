@@ -7,7 +7,7 @@ from pathlib import Path
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig, OmegaConf
 
-from stereo_occ.checks import check_pairs
+from stereo_occ.checks.pairs import check_pairs
 from stereo_occ.cli import entry_point
 from stereo_occ.config import InspectConfig
 from stereo_occ.data.config import MeshFilesConfig

@@ -1,10 +1,9 @@
 """What is wrong with a command line: every problem at once, one line each with the key, its value and a remedy."""
 
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import fields, is_dataclass
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,18 +13,7 @@ from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
 from hydra.errors import HydraException, MissingConfigException
-from omegaconf import (
-    BooleanNode,
-    DictConfig,
-    EnumNode,
-    FloatNode,
-    IntegerNode,
-    ListConfig,
-    Node,
-    OmegaConf,
-    StringNode,
-    open_dict,
-)
+from omegaconf import DictConfig, Node, OmegaConf, open_dict
 from omegaconf.errors import (
     InterpolationKeyError,
     InterpolationToMissingValueError,
@@ -33,6 +21,7 @@ from omegaconf.errors import (
 )
 from yaml import YAMLError
 
+from stereo_occ.advice import expected_value, nearest, one_line, unknown_key
 from stereo_occ.config import register_schemas
 from stereo_occ.foreign_code import code_named
 from stereo_occ.paths import conf_dir
@@ -119,13 +108,6 @@ def find_problems(
         return list(dict.fromkeys(problems))
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Advice on a misspelt name: the nearest known ones, or all of them."""
-    known = sorted(known)
-    close = get_close_matches(name, known, n=3, cutoff=0.5)
-    return f"did you mean {' or '.join(close)}?" if close else f"known: {', '.join(known)}"
-
-
 def _compositions(config_name: str) -> Compositions:
     """Compositions of a file in ``conf/``, each made once: it takes tenths of a second."""
 
@@ -172,7 +154,7 @@ def _problems_of_job(
     try:
         cfg = deepcopy(composed(tuple(overrides)))
     except COMPOSITION_ERRORS as error:
-        return _problems_one_by_one(config_name, overrides) or [_one_line(error)]
+        return _problems_one_by_one(config_name, overrides) or [one_line(error)]
     nodes, given = _nodes(cfg), set(map(_key, overrides))
     values = [*_of_given(_unresolved(nodes, given), given), *_of_given(_too_large(nodes), given)]
     if check is None:
@@ -183,7 +165,7 @@ def _problems_of_job(
     schema = OmegaConf.get_type(cfg)
     assert is_dataclass(schema)
     known = [field.name for field in fields(schema)]
-    problems = [f"{key}: {_unknown(key, known)}" for key in map(str, cfg) if key not in known]
+    problems = [f"{key}: {unknown_key(key, known)}" for key in map(str, cfg) if key not in known]
     problems += [f"{key}: no value given; add {key}=..." for key, node in nodes.items() if node._is_missing()]
     if problems or values:
         return [*problems, *values]
@@ -256,13 +238,13 @@ def _problems_one_by_one(config_name: str, overrides: list[str]) -> list[str]:
                     f"{override}: there is no {group} to change; say {group}=..., one of {options}"
                 )
             elif node is None:
-                problems.append(f"{_key(override)}: {_unknown(_key(override), known)}")
+                problems.append(f"{_key(override)}: {unknown_key(_key(override), known)}")
             elif key.startswith("+") and not key.startswith("++"):
                 problems.append(f"{override}: the key exists already; write {override[1:]}")
-            elif expected := _expected(node, key.lstrip("+")):
+            elif expected := expected_value(node, key.lstrip("+")):
                 problems.append(f"{key}={value}: must be {expected}")
             else:
-                problems.append(f"{override}: {_one_line(error)}")
+                problems.append(f"{override}: {one_line(error)}")
     return problems
 
 
@@ -276,7 +258,7 @@ def _problem_of_group(config_name: str, override: str, good: list[str], error: E
         return f"{key}={value}: unknown choice; {nearest(str(value), options)}"
     choices = compose(config_name, good, return_hydra_config=True).hydra.runtime.choices
     if _key(override) in choices:
-        return f"{override}: {_one_line(error)}"
+        return f"{override}: {one_line(error)}"
     owner, _, part = _key(override).rpartition("/")
     if owner in choices:
         return f"{override}: {owner}={choices[owner]} has no {part}; leave it out or choose another {owner}"
@@ -305,43 +287,3 @@ def _nodes(cfg: DictConfig, prefix: str = "") -> dict[str, Node]:
         if isinstance(target, DictConfig) and not target._is_missing():
             nodes |= _nodes(target, f"{prefix}{name}.")
     return nodes
-
-
-def _unknown(key: str, known: Iterable[str]) -> str:
-    """Advice on an unknown key: near ones beside it, the same name elsewhere, or all that there are beside it."""
-    known = [k for k in known if (k.partition(".")[0] == "hydra") == key.startswith("hydra.")]
-    parent, _, name = key.rpartition(".")
-    while parent and parent not in known:
-        parent, _, name = parent.rpartition(".")
-    beside = [k.rpartition(".")[2] for k in known if k.rpartition(".")[0] == parent]
-    prefix = f"{parent}." if parent else ""
-    close = [prefix + match for match in get_close_matches(name, beside, n=2)]
-    close = close or [k for k in known if k.rpartition(".")[2] == name][:3]
-    if close:
-        return f"unknown key; did you mean {' or '.join(close)}?"
-    return f"unknown key; known{' in ' + parent if parent else ''}: {', '.join(beside)}"
-
-
-def _expected(node: Node, key: str) -> str | None:
-    """What values the node of a key takes, in words."""
-    if isinstance(node, EnumNode):
-        return f"one of {', '.join(node.enum_type.__members__)}"
-    if isinstance(node, ListConfig):
-        return "a list in brackets" if node._is_none() else f"a list such as [{','.join(map(str, node))}]"
-    target = node._maybe_dereference_node()
-    if isinstance(target, DictConfig):
-        return f"given key by key: {' '.join(f'{key}.{name}=...' for name in map(str, target))}"
-    words: dict[type[Node], str] = {
-        BooleanNode: "true or false",
-        IntegerNode: "a whole number",
-        FloatNode: "a number",
-        StringNode: "text",
-    }
-    return words.get(type(node))
-
-
-def _one_line(error: Exception) -> str:
-    lines = [line.strip() for line in str(error.__cause__ or error).splitlines()]
-    return "; ".join(
-        line for line in lines if line and not line.startswith(("object_type", "reference_type"))
-    )

@@ -14,7 +14,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from stereo_occ.auxiliary import AuxiliaryConfig
 from stereo_occ.checkpoint import build_task, plain
-from stereo_occ.checks import check_training
+from stereo_occ.checks.training import check_training
 from stereo_occ.cli import entry_point
 from stereo_occ.config import Resume, TrainConfig
 from stereo_occ.data.datamodule import PairsDataModule

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from omegaconf import DictConfig, OmegaConf
 
-from stereo_occ.checks import check_rendering
+from stereo_occ.checks.pairs import check_rendering
 from stereo_occ.cli import entry_point
 from stereo_occ.config import RenderConfig
 from stereo_occ.data.config import MeshFilesConfig

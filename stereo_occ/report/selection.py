@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stereo_occ.advice import nearest
 from stereo_occ.errors import UserError
 from stereo_occ.evaluation_rows import Key
-from stereo_occ.problems import nearest
 from stereo_occ.report.models import Model, in_order
 
 #: What models and views are ranked by.

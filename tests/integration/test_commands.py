@@ -8,7 +8,9 @@ import pytest
 import torch
 
 import stereo_occ
-from stereo_occ.checks import check_evaluation, check_pairs, check_rendering, check_training
+from stereo_occ.checks.evaluation import check_evaluation
+from stereo_occ.checks.pairs import check_pairs, check_rendering
+from stereo_occ.checks.training import check_training
 from stereo_occ.export import check_export
 from stereo_occ.problems import find_problems
 from stereo_occ.reconstruct import check_reconstruction

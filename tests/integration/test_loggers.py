@@ -12,7 +12,7 @@ from runs import program
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from test_training import INTERVAL, STEPS, stopped
 
-from stereo_occ.checks import check_training
+from stereo_occ.checks.training import check_training
 from stereo_occ.problems import find_problems
 
 EVERY_STEP = list(range(1, STEPS + 1))

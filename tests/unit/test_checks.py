@@ -8,7 +8,9 @@ import yaml
 from omegaconf import OmegaConf
 from samples import single_line
 
-from stereo_occ.checks import check_evaluation, check_pairs, check_rendering, check_training
+from stereo_occ.checks.evaluation import check_evaluation
+from stereo_occ.checks.pairs import check_pairs, check_rendering
+from stereo_occ.checks.training import check_training
 from stereo_occ.cli import compose_config
 from stereo_occ.problems import find_problems
 

@@ -8,9 +8,10 @@ import pytest
 from samples import single_line
 
 from stereo_occ import cli, evaluate, train
+from stereo_occ.advice import nearest
 from stereo_occ.cli import compose_config
 from stereo_occ.errors import UserError
-from stereo_occ.problems import find_problems, nearest
+from stereo_occ.problems import find_problems
 
 
 def found(*overrides, program="train", **kwargs):

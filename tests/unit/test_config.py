@@ -11,7 +11,9 @@ from omegaconf import OmegaConf
 from samples import PAPER_COUNTS
 
 from stereo_occ.checkpoint import plain
-from stereo_occ.checks import check_evaluation, check_pairs, check_rendering, check_training
+from stereo_occ.checks.evaluation import check_evaluation
+from stereo_occ.checks.pairs import check_pairs, check_rendering
+from stereo_occ.checks.training import check_training
 from stereo_occ.cli import compose_config
 from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
