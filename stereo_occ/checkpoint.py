@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import torch
 from omegaconf import DictConfig, OmegaConf
 
-from stereo_occ.config import TrainConfig, training_config
+from stereo_occ.config import TrainConfig
 from stereo_occ.data.rigs import build_rig
 from stereo_occ.errors import UserError
 from stereo_occ.models.build import build_model
 from stereo_occ.packaged import find_weights, read_weights
+from stereo_occ.saved_config import training_config
 
 if TYPE_CHECKING:
     from stereo_occ.task import OccupancyTask

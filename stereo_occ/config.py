@@ -9,8 +9,7 @@ from functools import cache
 from typing import Any
 
 from hydra.core.config_store import ConfigStore
-from omegaconf import MISSING, DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
+from omegaconf import MISSING, OmegaConf
 
 from stereo_occ.auxiliary import AuxiliaryConfig
 from stereo_occ.averaging import AveragingConfig
@@ -21,7 +20,6 @@ from stereo_occ.data.controls import ControlConfig
 from stereo_occ.data.placement import PlacementConfig
 from stereo_occ.data.rigs import RIG_SCHEMAS, RigConfig, ToedInRigConfig
 from stereo_occ.decision import DecisionRule
-from stereo_occ.errors import UserError
 from stereo_occ.inference_config import ExportConfig, ReconstructConfig
 from stereo_occ.loggers.config import LoggerConfig
 from stereo_occ.models.config import register_schemas as register_model_schemas
@@ -220,37 +218,6 @@ class RenderConfig(PairsConfig):
     slice: SliceConfig = field(default_factory=SliceConfig)
     verify: bool = False  # render nothing, compare what is there with its checksums
     progress: bool = field(default=True)
-
-
-def training_config(values: Any) -> DictConfig:
-    """The typed training configuration of plain values, as a checkpoint holds them.
-
-    Raises:
-        UserError: a key is unknown, a value has the wrong type, or one refers to something outside, such as a variable
-            of the environment.
-    """
-    if _refers(values):
-        raise UserError("configuration: holds ${...}, which no training writes; use another checkpoint")
-    try:
-        kinds = {
-            "data": OmegaConf.structured(DATA_SCHEMAS[values["data"]["name"]]),
-            "rig": OmegaConf.structured(RIG_SCHEMAS[values["rig"].get("kind", ToedInRigConfig.kind)]),
-        }
-        cfg = OmegaConf.merge(OmegaConf.structured(TrainConfig), kinds, values)
-    except (KeyError, TypeError, AttributeError, ValueError, OmegaConfBaseException) as error:
-        reason = " ".join(str(error).split("\n")[:1]) or type(error).__name__
-        raise UserError(f"configuration: {reason}; it was written by another version") from error
-    assert isinstance(cfg, DictConfig)
-    return cfg
-
-
-def _refers(value: Any) -> bool:
-    """Whether plain nested values hold what OmegaConf would look up elsewhere."""
-    if isinstance(value, dict):
-        return any(_refers(part) for part in (*value, *value.values()))
-    if isinstance(value, list | tuple):
-        return any(map(_refers, value))
-    return isinstance(value, str) and "${" in value
 
 
 @cache

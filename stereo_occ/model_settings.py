@@ -5,9 +5,9 @@ from contextlib import suppress
 from typing import Any
 
 from stereo_occ.checkpoint import plain
-from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
 from stereo_occ.flat import flat
+from stereo_occ.saved_config import training_config
 
 Settings = dict[str, Any]
 

@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from omegaconf import OmegaConf
 
-from stereo_occ.config import TrainConfig, training_config
+from stereo_occ.config import TrainConfig
 from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.models.base import POINTS_IN_CACHE, StereoViews
 from stereo_occ.onnx_export import INPUTS, onnx_paths
 from stereo_occ.packaged import checked_content, find_weights, read_description
 from stereo_occ.reconstruction import Occupancy
+from stereo_occ.saved_config import training_config
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from trimesh import Trimesh
 from trimesh.visual import ColorVisuals
@@ -21,7 +20,6 @@ from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.camera import transform_points
 from stereo_occ.mesh_output import collapsed, simplified
-from stereo_occ.models.base import StereoViews
 from stereo_occ.packaged import DEFAULT
 from stereo_occ.photographs.color import vertex_colors
 from stereo_occ.photographs.doubts import doubts
@@ -30,7 +28,7 @@ from stereo_occ.photographs.given import ImageFile, Pair, both, locate_pair, pho
 from stereo_occ.photographs.locate import Found
 from stereo_occ.photographs.match import SIDES
 from stereo_occ.photographs.outline import preview
-from stereo_occ.photographs.photo import Photo, seen_by
+from stereo_occ.photographs.views import views_of
 from stereo_occ.reconstruction import expected_iou, sample_cube, threshold_of
 from stereo_occ.trained import Predict, load_trained
 
@@ -208,7 +206,7 @@ class Reconstructor:
             found = locate_pair(pair, photos, boxes, masks, find, required)
         with _timed(seconds, "frame"):
             framing = self._frame(pair, found, find, center_3, size)
-            views = self._views(pair, photos, found, framing)
+            views = views_of(pair, photos, found, framing, self.config.background, self.name)
         with _timed(seconds, "encode"):
             occupancy = self.predict(views)
         with _timed(seconds, "extract"):
@@ -270,38 +268,6 @@ class Reconstructor:
     def _doubts(self, pair: RealPair, found: tuple[Found, Found] | None, framing: Framing) -> list[str]:
         config = self.config.rig
         return doubts(pair, found, framing, config) if isinstance(config, RectifiedRigConfig) else []
-
-    def _views(
-        self, pair: RealPair, photos: tuple[Photo, Photo], found: tuple[Found, Found] | None, framing: Framing
-    ) -> StereoViews:
-        """What the model is given: cut, straightened, and behind the object what it was trained with."""
-        background = self.config.background
-        masks = None if found is None or found[0].mask_HW is None or found[1].mask_HW is None else found
-        one_mask = found is not None and (found[0].mask_HW is None) != (found[1].mask_HW is None)
-        if masks is None and (background.masked == 1 or (one_mask and background.clutter is None)):
-            raise UserError(
-                f"the checkpoint {self.name} was trained on pictures without a background: give left_mask= and "
-                f"right_mask=, or images that are transparent around the object"
-            )
-        images = []
-        for index, (photo, camera, view) in enumerate(
-            zip(photos, pair.cameras, framing.cameras, strict=True)
-        ):
-            rgb_HW3 = seen_by(photo.rgb_HW3, camera, view) / 255
-            if masks is not None and (background.masked or background.clutter is None):
-                mask_HW = masks[index].mask_HW
-                assert mask_HW is not None
-                share_HW1 = seen_by(mask_HW[..., None].astype(np.uint8) * 255, camera, view, outside=0) / 255
-                color_3 = (np.array(background.low) + background.high) / 2
-                rgb_HW3 = rgb_HW3 * share_HW1 + color_3 * (1 - share_HW1)
-            images.append(torch.as_tensor(np.asarray(rgb_HW3, dtype=np.float32)).permute(2, 0, 1)[None])
-        cameras = framing.rig.cameras
-        return StereoViews(
-            images[0],
-            images[1],
-            torch.as_tensor(np.stack([camera.K for camera in cameras]), dtype=torch.float32)[None],
-            torch.as_tensor(np.stack([c.camera_from_rig for c in cameras]), dtype=torch.float32)[None],
-        )
 
 
 def _place(center: Sequence[float]) -> NDArray[np.float64]:

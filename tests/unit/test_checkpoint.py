@@ -10,11 +10,11 @@ from samples import TINY, single_line
 from stereo_occ import __version__
 from stereo_occ.checkpoint import KEY, VERSION, build_task, plain, read_checkpoint
 from stereo_occ.cli import compose_config
-from stereo_occ.config import training_config
 from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.provenance import environment
 from stereo_occ.resume import AtomicCheckpoints, step_to_resume
+from stereo_occ.saved_config import training_config
 from stereo_occ.trained import trained_model
 from stereo_occ.writing import write_json
 

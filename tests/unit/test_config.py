@@ -15,10 +15,10 @@ from stereo_occ.checks.evaluation import check_evaluation
 from stereo_occ.checks.pairs import check_pairs, check_rendering
 from stereo_occ.checks.training import check_training
 from stereo_occ.cli import compose_config
-from stereo_occ.config import training_config
 from stereo_occ.errors import UserError
 from stereo_occ.paths import conf_dir
 from stereo_occ.problems import find_problems
+from stereo_occ.saved_config import training_config
 
 PROGRAMS = ("train", "render", "evaluate")
 FILES = sorted(path.relative_to(conf_dir()).with_suffix("") for path in conf_dir().rglob("*.yaml"))

@@ -10,11 +10,11 @@ import torch
 from samples import solid, views_of
 
 from stereo_occ.checkpoint import KEY, plain, read_checkpoint
-from stereo_occ.config import training_config
 from stereo_occ.data.shard import Shard
 from stereo_occ.data.verify import verify
 from stereo_occ.models.base import StereoViews
 from stereo_occ.resume import step_to_resume
+from stereo_occ.saved_config import training_config
 from stereo_occ.trained import load_trained
 
 V1 = Path(__file__).parents[1] / "fixtures" / "v1"

@@ -16,13 +16,13 @@ from scipy.spatial.transform import Rotation
 from stereo_occ.calibration import Lens, RealCamera, RealPair
 from stereo_occ.checkpoint import plain
 from stereo_occ.cli import compose_config
-from stereo_occ.config import training_config
 from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
 from stereo_occ.geometry.crop import Box
 from stereo_occ.models.sampling import project_points, sample_maps
 from stereo_occ.photographs import detect
 from stereo_occ.reconstructor import Reconstructor, SurfaceOptions
+from stereo_occ.saved_config import training_config
 
 CENTER, RADIUS = np.array([0.05, 0.04, 0.6]), 0.05
 W, H = 640, 360
