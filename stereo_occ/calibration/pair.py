@@ -7,7 +7,13 @@ from numpy.typing import NDArray
 
 from stereo_occ.calibration.lens import Lens
 from stereo_occ.errors import UserError
-from stereo_occ.geometry.camera import Camera, StereoRig, check_rigid, resized_intrinsics
+from stereo_occ.geometry.camera import (
+    Camera,
+    StereoRig,
+    centered_intrinsics,
+    check_rigid,
+    resized_intrinsics,
+)
 
 #: Baselines that a pair of cameras for household objects may have, metres.
 BASELINES = (0.005, 3.0)
@@ -203,7 +209,7 @@ class RealPair:
         focal = float(np.mean([camera.K[[0, 1], [0, 1]] for camera in self.cameras]))
         cameras = []
         width, height = _size(self.left)
-        K = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
+        K = centered_intrinsics(focal, width, height)
         for camera in self.cameras:
             pose = np.eye(4)
             pose[:3, :3], pose[:3, 3] = R_33, -R_33 @ camera.center_3

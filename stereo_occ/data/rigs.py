@@ -9,7 +9,7 @@ from omegaconf import MISSING
 from scipy.spatial.transform import Rotation
 
 from stereo_occ.errors import UserError
-from stereo_occ.geometry.camera import Camera, StereoRig, intrinsics, toed_in_rig
+from stereo_occ.geometry.camera import Camera, StereoRig, centered_intrinsics, intrinsics, toed_in_rig
 from stereo_occ.geometry.crop import Box
 from stereo_occ.geometry.cube import cube_at
 from stereo_occ.ranges import bounds, draw, share
@@ -169,8 +169,7 @@ def _parallel(config: RectifiedRigConfig, baseline: float, fov: float) -> Stereo
         raise UserError(
             f"rig.width, rig.height: must be at least 1 pixel, got {config.width} x {config.height}"
         )
-    focal = config.width / 2 / tan(fov / 2)
-    K = np.array([[focal, 0, (config.width - 1) / 2], [0, focal, (config.height - 1) / 2], [0, 0, 1]])
+    K = centered_intrinsics(config.width / 2 / tan(fov / 2), config.width, config.height)
     cameras = []
     for x in (-baseline / 2, baseline / 2):
         camera_from_rig = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -149,8 +149,12 @@ def toed_in_rig(distance: float, half_angle: float, fov: float, side: int) -> St
 
 def intrinsics(fov: float, side: int) -> NDArray[np.float64]:
     """Intrinsics (3x3) of a centred square camera with field of view ``fov`` radians and ``side`` pixels."""
-    focal, principal = side / 2 / tan(fov / 2), (side - 1) / 2
-    return np.array([[focal, 0, principal], [0, focal, principal], [0, 0, 1]], dtype=np.float64)
+    return centered_intrinsics(side / 2 / tan(fov / 2), side, side)
+
+
+def centered_intrinsics(focal: float, width: int, height: int) -> NDArray[np.float64]:
+    """Intrinsics (3x3) of square pixels whose principal point is the image's centre; all in pixels."""
+    return np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]], dtype=np.float64)
 
 
 def look_at_origin(angle: float, distance: float) -> NDArray[np.float64]:

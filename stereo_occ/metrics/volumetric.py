@@ -23,7 +23,8 @@ def iou_at_thresholds(logits_BN: Tensor, occupied_BN: Tensor, thresholds_T: Tens
     """
     true_BT, false_BT, positives_B1 = _count(logits_BN, occupied_BN, thresholds_T)
     union_BT = positives_B1 + false_BT
-    return _failed_is_zero(_ratio(true_BT, union_BT, union_BT == 0), logits_BN)
+    iou_BT = torch.where(union_BT == 0, 1.0, true_BT / union_BT.clamp(min=1))  # two empty sets are alike
+    return _failed_is_zero(iou_BT, logits_BN)
 
 
 def category_means(values_V: Tensor, categories: Sequence[str]) -> dict[str, float]:
@@ -68,11 +69,6 @@ def _count(logits_BN: Tensor, occupied_BN: Tensor, thresholds_T: Tensor) -> tupl
     count_B2K = flat_BN.flatten().bincount(minlength=batch * 2 * bins).view(batch, 2, bins)
     above_B2K = count_B2K.flip(-1).cumsum(-1).flip(-1)
     return above_B2K[:, 1, 1:], above_B2K[:, 0, 1:], above_B2K[:, 1, :1]
-
-
-def _ratio(part: Tensor, whole: Tensor, both_empty: Tensor) -> Tensor:
-    """``part / whole``; where the whole is 0, 1 if both are empty, else 0."""
-    return torch.where(whole == 0, both_empty.float(), part / whole.clamp(min=1))
 
 
 def _failed_is_zero(score_BT: Tensor, logits_BN: Tensor) -> Tensor:

@@ -9,7 +9,7 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from scipy.ndimage import convolve1d
+from scipy.ndimage import gaussian_filter
 
 from stereo_occ.geometry.camera import StereoRig
 from stereo_occ.ranges import bounds
@@ -126,10 +126,8 @@ def _falloff(K_33: NDArray[np.float64], height: int, width: int) -> NDArray[np.f
 def _soften(picture_HW3: NDArray[np.float32], sigma: float) -> None:
     if sigma < 0.2:  # less than a hundredth of the light leaves a pixel
         return
-    steps = np.arange(-int(3 * sigma + 1), int(3 * sigma + 1) + 1)
-    kernel = np.exp(-0.5 * (steps / sigma) ** 2)
-    for axis in (0, 1):
-        convolve1d(picture_HW3, kernel / kernel.sum(), axis, picture_HW3, mode="nearest")
+    radius = int(3 * sigma + 1)
+    gaussian_filter(picture_HW3, sigma, output=picture_HW3, mode="nearest", radius=radius, axes=(0, 1))
 
 
 def _smear(picture_HW3: NDArray[np.float32], length: float, turn: float) -> None:
