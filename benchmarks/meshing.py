@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 from torch import nn
 
-from stereo_occ.meshing import extract_mesh
+from stereo_occ.meshing import sample_field
 
 LOW, HIGH = -0.5 * np.ones(3), 0.5 * np.ones(3)
 
@@ -54,7 +54,7 @@ def main() -> None:
     for resolution in (64, 128):
         sparse, dense = Cup(), Cup()
         start = perf_counter()
-        faces = len(extract_mesh(sparse, LOW, HIGH, resolution).faces)
+        faces = len(sample_field(sparse, LOW, HIGH, resolution).surface().faces)
         middle = perf_counter()
         same = full_grid(dense, resolution) == faces
         seconds, dense_seconds = middle - start, perf_counter() - middle

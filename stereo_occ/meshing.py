@@ -17,42 +17,6 @@ from stereo_occ.errors import UserError
 _COARSEST = 32  # cells per axis: on coarser grids yet, whole parts of an object may fall between the samples
 
 
-def extract_mesh(
-    occupancy: Callable[[NDArray[np.float32]], NDArray[np.floating]],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-    resolution: int = 128,
-    level: float = 0.0,
-    batch: int = 65536,
-    steps: int = 0,
-) -> Trimesh:
-    """The surface where occupancy logits cross ``level``, in the frame and the units of the points asked.
-
-    Multi-resolution iso-surface extraction (Mescheder et al., Occupancy Networks, 2019): ``resolution``
-    is halved while it is above 32 and even, and that grid is evaluated in full. On each grid of half
-    the spacing only the corners of mixed cells are evaluated, then those of the cells found to be mixed
-    in turn, until there are none. So the surface is followed wherever it leads, and the mesh is the one
-    of the full grid, except for loose pieces that fall between the samples of the coarser ones. Then
-    marching cubes (Lewiner et al., 2003), faces outward.
-
-    Args:
-        occupancy: logits ``(N,)`` of points ``(N, 3)``; NaN counts as outside.
-        low, high: corners ``(3,)`` of the box to search. The surface is closed where the object leaves it.
-        resolution: cells per axis.
-        level: logit of the decision threshold.
-        batch: points asked at once.
-        steps: of the search for each vertex's true place on its edge of the grid, where marching cubes
-            interpolates linearly; each asks one point per vertex.
-
-    Returns:
-        A closed mesh, or an empty one if nothing is inside.
-
-    Raises:
-        UserError: if the resolution or batch is below 1, or the box empty.
-    """
-    return sample_field(occupancy, low, high, resolution, level, batch).surface(steps)
-
-
 @dataclass(frozen=True, eq=False)
 class SampledField:
     """Occupancy logits on a grid: evaluated around the surface, interpolated on the right side elsewhere.
@@ -78,7 +42,15 @@ class SampledField:
         return len(self.values_CCC) - 1
 
     def surface(self, steps: int = 0) -> Trimesh:
-        """The closed mesh where the level is crossed, empty if nothing is inside; see :func:`extract_mesh`."""
+        """The closed mesh where the level is crossed: marching cubes (Lewiner et al., 2003), faces outward.
+
+        Args:
+            steps: of the search for each vertex's true place on its edge of the grid, where marching cubes
+                interpolates linearly; each asks one point per vertex.
+
+        Returns:
+            In the frame of the box; empty if nothing is inside.
+        """
         if not (self.values_CCC > self.level).any():
             return Trimesh()
         # One layer far below the level closes the surface, within 1e-4 of a cell of the box.
@@ -135,7 +107,24 @@ def sample_field(
     level: float = 0.0,
     batch: int = 65536,
 ) -> SampledField:
-    """The grid that :func:`extract_mesh` takes its surface from."""
+    """Occupancy logits around the surface where they cross ``level``, in the frame and the units of the points asked.
+
+    Multi-resolution iso-surface extraction (Mescheder et al., Occupancy Networks, 2019): ``resolution``
+    is halved while it is above 32 and even, and that grid is evaluated in full. On each grid of half
+    the spacing only the corners of mixed cells are evaluated, then those of the cells found to be mixed
+    in turn, until there are none. So the surface is followed wherever it leads, and the mesh is the one
+    of the full grid, except for loose pieces that fall between the samples of the coarser ones.
+
+    Args:
+        occupancy: logits ``(N,)`` of points ``(N, 3)``; NaN counts as outside.
+        low, high: corners ``(3,)`` of the box to search. The surface is closed where the object leaves it.
+        resolution: cells per axis.
+        level: logit of the decision threshold.
+        batch: points asked at once.
+
+    Raises:
+        UserError: if the resolution or batch is below 1, or the box empty.
+    """
     if resolution < 1 or batch < 1:
         raise UserError(f"meshing: resolution and batch must be at least 1, got {resolution} and {batch}")
     if not (high > low).all():

@@ -11,7 +11,7 @@ from torch import Tensor
 from trimesh import Trimesh
 
 from stereo_occ.decision import Decision
-from stereo_occ.meshing import extract_mesh
+from stereo_occ.meshing import sample_field
 from stereo_occ.models.base import StereoViews
 from stereo_occ.predictors import ObjectView
 
@@ -49,13 +49,13 @@ class Baseline(ABC):
     def mesh(self, view: ObjectView, picture: StereoViews, resolution: int) -> Trimesh:
         """The surface at the decision threshold, rig frame; empty if there is none."""
         field = self.look(view)
-        return extract_mesh(
+        return sample_field(
             lambda points_N3: _logits(field, points_N3.astype(np.float64)),
             low=-0.5 * np.ones(3),
             high=0.5 * np.ones(3),
             resolution=resolution,
             level=log(self.decision.threshold / (1 - self.decision.threshold)),
-        )
+        ).surface()
 
 
 def _logits(field: Field, points_N3: NDArray[np.float64]) -> NDArray[np.float64]:

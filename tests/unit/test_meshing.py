@@ -3,9 +3,13 @@ import pytest
 from skimage.measure import marching_cubes
 
 from stereo_occ.errors import UserError
-from stereo_occ.meshing import extract_mesh
+from stereo_occ.meshing import sample_field
 
 LOW, HIGH = -0.5 * np.ones(3), 0.5 * np.ones(3)
+
+
+def extract_mesh(*arguments, steps=0, **settings):
+    return sample_field(*arguments, **settings).surface(steps)
 
 
 def ball(radius, center=(0.0, 0, 0)):
