@@ -47,6 +47,7 @@ class ReconstructConfig:
     find: Findable | None = None  # in the left image, with torchvision's detector
     center: list[float] | None = None  # of the object, left camera's frame, metres
     size: float | None = None  # diagonal of the object's bounding box, metres
+    mirror: bool | None = None  # ask about the mirror image too; null: if the training had mirror images
     threshold: float | None = None  # occupancy probability at the surface; null: the checkpoint's
     resolution: int = MISSING  # cells along each side of the working cube
     steps: int = MISSING  # of the search for each vertex's true place

@@ -82,6 +82,7 @@ def reconstruct_pair(cfg: DictConfig) -> Reconstruction:
         size=settings.size,
         unit=settings.unit,
         rectified=settings.rectified,
+        mirror=settings.mirror,
         surface=SurfaceOptions(
             settings.threshold, settings.resolution, settings.steps, settings.simplify, settings.color
         ),

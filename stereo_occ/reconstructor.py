@@ -30,7 +30,7 @@ from stereo_occ.photographs.match import SIDES
 from stereo_occ.photographs.outline import preview
 from stereo_occ.photographs.views import views_of
 from stereo_occ.reconstruction import expected_iou, sample_cube, threshold_of
-from stereo_occ.trained import Predict, load_trained
+from stereo_occ.trained import Predict, load_trained, with_mirror_image
 
 logger = logging.getLogger(__name__)
 
@@ -173,6 +173,7 @@ class Reconstructor:
         size: float | None = None,
         unit: str | float | None = None,
         rectified: bool = False,
+        mirror: bool | None = None,
         surface: SurfaceOptions = SurfaceOptions(),
     ) -> Reconstruction:
         """The mesh of the object in a pair.
@@ -188,6 +189,8 @@ class Reconstructor:
             find: mug, bowl or bottle: the likeliest one in the left image, by a detector that is fetched once.
             center: of the object ``(3,)``, left camera's frame, metres; triangulated if None.
             size: diagonal of the object's bounding box, metres; from the boxes if None.
+            mirror: ask the model about the pair's mirror image too and take the mean, in twice the time; None: if its
+                training had mirror images.
 
         Raises:
             UserError: for anything in this that the user can put right, or if nothing is found to be occupied.
@@ -208,7 +211,8 @@ class Reconstructor:
             framing = self._frame(pair, found, find, center_3, size)
             views = views_of(pair, photos, found, framing, self.config.background, self.name)
         with _timed(seconds, "encode"):
-            occupancy = self.predict(views)
+            both_ways = self.config.augmentation.mirror > 0 if mirror is None else mirror
+            occupancy = (with_mirror_image(self.predict) if both_ways else self.predict)(views)
         with _timed(seconds, "extract"):
             threshold = (
                 threshold_of(self.decision, occupancy) if surface.threshold is None else surface.threshold

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from omegaconf import OmegaConf
 
 from stereo_occ.checkpoint import config_of, plain, read_checkpoint
 from stereo_occ.config import TrainConfig
+from stereo_occ.data.augmentation import FLIP_3, mirrored_views
 from stereo_occ.data.rigs import build_rig
 from stereo_occ.decision import Decision
 from stereo_occ.errors import UserError
@@ -20,6 +22,20 @@ from stereo_occ.reconstruction import Occupancy, occupancy_of
 
 #: What a stereo pair (``B = 1``) makes of a model.
 Predict = Callable[[StereoViews], Occupancy]
+
+
+def with_mirror_image(predict: Predict) -> Predict:
+    """Test-time augmentation: the mean of the logits for a pair and for its mirror image.
+
+    A network takes the two for different pairs, so the errors of its two answers are partly different ones.
+    """
+
+    def predict_both(views: StereoViews) -> Occupancy:
+        own, other = predict(views), predict(mirrored_views(views))
+        flip_3 = np.array(FLIP_3, np.float32)
+        return lambda points_N3: (own(points_N3) + other(points_N3 * flip_3)) / 2
+
+    return predict_both
 
 
 @dataclass(frozen=True, eq=False)

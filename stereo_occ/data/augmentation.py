@@ -10,6 +10,7 @@ from torch.nn.functional import conv2d, grid_sample, pad
 
 from stereo_occ.data.batch import Batch, ImageTruth, Queries
 from stereo_occ.geometry.camera import normalize_pixels
+from stereo_occ.models.base import StereoViews
 
 
 @dataclass
@@ -38,15 +39,24 @@ def augmented(config: AugmentationConfig, batch: Batch, rng: np.random.Generator
     return replace(batch, views=replace(batch.views, left_BCHW=left_BCHW, right_BCHW=right_BCHW))
 
 
-def mirrored(batch: Batch, chosen_B: Tensor) -> Batch:
-    """The chosen pairs as if the world were mirrored, x to -x: the mirror image of the right view is the left one."""
-    views, truth = batch.views, batch.truth
-    flip_3 = torch.tensor([-1.0, 1.0, 1.0])
-    flip_44 = torch.diag(torch.tensor([-1.0, 1.0, 1.0, 1.0]))
+#: Points of the rig frame to those of the mirrored world.
+FLIP_3 = (-1.0, 1.0, 1.0)
+
+
+def mirrored_views(views: StereoViews) -> StereoViews:
+    """Pairs as if the world were mirrored, x to -x: the mirror image of the right view is the left one."""
+    flip_44 = torch.diag(torch.tensor([*FLIP_3, 1.0]))
     K_B233 = views.K_B233.flip(1)
     K_B233[..., 0, 1] *= -1
     K_B233[..., 0, 2] = views.left_BCHW.shape[-1] - 1 - K_B233[..., 0, 2]
     extrinsics_B244 = flip_44 @ views.camera_from_rig_B244.flip(1) @ flip_44
+    return StereoViews(views.right_BCHW.flip(-1), views.left_BCHW.flip(-1), K_B233, extrinsics_B244)
+
+
+def mirrored(batch: Batch, chosen_B: Tensor) -> Batch:
+    """The chosen pairs as :func:`mirrored_views` has them, with their points and their images' truth."""
+    views, other, truth = batch.views, mirrored_views(batch.views), batch.truth
+    flip_3 = torch.tensor(FLIP_3)
 
     def choose(mirror: Tensor, own: Tensor) -> Tensor:
         return torch.where(chosen_B.view(-1, *(1,) * (own.ndim - 1)), mirror, own)
@@ -55,10 +65,10 @@ def mirrored(batch: Batch, chosen_B: Tensor) -> Batch:
         batch,
         views=replace(
             views,
-            left_BCHW=choose(views.right_BCHW.flip(-1), views.left_BCHW),
-            right_BCHW=choose(views.left_BCHW.flip(-1), views.right_BCHW),
-            K_B233=choose(K_B233, views.K_B233),
-            camera_from_rig_B244=choose(extrinsics_B244, views.camera_from_rig_B244),
+            left_BCHW=choose(other.left_BCHW, views.left_BCHW),
+            right_BCHW=choose(other.right_BCHW, views.right_BCHW),
+            K_B233=choose(other.K_B233, views.K_B233),
+            camera_from_rig_B244=choose(other.camera_from_rig_B244, views.camera_from_rig_B244),
         ),
         queries={
             name: Queries(choose(queries.points_BN3 * flip_3, queries.points_BN3), queries.occupied_BN)

@@ -349,6 +349,48 @@ def test_python_takes_arrays_and_pillows_images():
     np.testing.assert_array_equal(one.mesh.vertices, other.mesh.vertices)
 
 
+@pytest.mark.parametrize("name", PAIRS)
+def test_the_mirror_image_of_a_pair_says_the_same_of_the_same_place(name):
+    """Silhouettes know no side, so asking about the mirror image as well changes nothing."""
+    pair = PAIRS[name]
+    images = [photograph(camera, center=np.array([0.07, 0.02, 0.5])) for camera in pair.cameras]
+    alone, both = (
+        on_object()(*images, pair, mirror=mirror, surface=SurfaceOptions(resolution=48))
+        for mirror in (False, True)
+    )
+    np.testing.assert_allclose(both.mesh.bounds, alone.mesh.bounds, atol=2e-4)
+    assert both.mesh.volume == pytest.approx(alone.mesh.volume, rel=0.01)
+
+
+def test_what_a_model_says_of_a_side_is_taken_back_by_the_mirror_image():
+    asked = []
+
+    def leaning(views):
+        asked.append(views)
+        return lambda points_N3: 10 * points_N3[:, 0] + points_N3[:, 1]
+
+    pair = PAIRS["parallel"]
+    images = [photograph(camera) for camera in pair.cameras]
+    model = Reconstructor(training("rig=rectified", "placement=free"), leaning, Decision(0.5), "leaning")
+    mesh = model(*images, pair, mirror=True, surface=COARSE).mesh_in_rig()
+    assert mesh.bounds[0, 1] == pytest.approx(0, abs=1e-3)  # what is left: above the middle
+    assert mesh.bounds[:, 0].sum() == pytest.approx(0, abs=1e-3)
+    own, other = asked
+    torch.testing.assert_close(other.left_BCHW, own.right_BCHW.flip(-1))
+    assert other.camera_from_rig_B244[0, 0, 0, 3] == pytest.approx(-own.camera_from_rig_B244[0, 1, 0, 3])
+
+
+@pytest.mark.parametrize(("share", "times"), [(0.0, 1), (0.5, 2)])
+def test_the_mirror_image_is_asked_about_where_training_had_some(share, times):
+    asked = []
+    pair = PAIRS["parallel"]
+    images = [photograph(camera) for camera in pair.cameras]
+    config = training("rig=rectified", "placement=free", f"augmentation.mirror={share}")
+    model = Reconstructor(config, lambda views: asked.append(views) or silhouettes(views), Decision(0.5), "")
+    model(*images, pair, surface=COARSE)
+    assert len(asked) == times
+
+
 def test_the_rig_frame_stands_upright_at_the_cube():
     pair = PAIRS["parallel"]
     result = on_object()(*map(photograph, pair.cameras), pair, surface=COARSE)
