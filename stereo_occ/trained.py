@@ -33,7 +33,7 @@ def with_mirror_image(predict: Predict) -> Predict:
     def predict_both(views: StereoViews) -> Occupancy:
         own, other = predict(views), predict(mirrored_views(views))
         flip_3 = np.array(FLIP_3, np.float32)
-        return lambda points_N3: (own(points_N3) + other(points_N3 * flip_3)) / 2
+        return lambda points_N3: np.asarray((own(points_N3) + other(points_N3 * flip_3)) / 2, np.float32)
 
     return predict_both
 
