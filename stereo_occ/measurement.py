@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
-from zlib import crc32
 
 import numpy as np
 import torch
@@ -15,6 +14,7 @@ from trimesh import Trimesh
 
 from stereo_occ.data.batch import Batch, map_tensors
 from stereo_occ.data.dataset import EvaluationPairs
+from stereo_occ.data.seeds import object_seed
 from stereo_occ.data.shard import Shard
 from stereo_occ.metrics.curves import logit_counts
 from stereo_occ.metrics.mesh import MeshScores, compare_meshes
@@ -143,6 +143,5 @@ def _only(views: StereoViews, index: int) -> StereoViews:
 def _mesh_scores(predicted: Trimesh, true: Trimesh, view: ObjectView, points: int) -> MeshScores:
     camera_from_rig_244 = view.shard.cameras(view.view)[1]
     centers_23 = np.linalg.inv(camera_from_rig_244)[:, :3, 3].astype(np.float64)
-    name = f"{view.shard.category}/{view.shard.object_id}"
-    rng = np.random.default_rng([crc32(name.encode()), view.view])
+    rng = np.random.default_rng([object_seed(view.shard.category, view.shard.object_id), view.view])
     return compare_meshes(predicted, true, centers_23, points, rng)

@@ -20,6 +20,7 @@ from PIL import Image
 from tqdm import tqdm
 from trimesh import Trimesh
 
+from experiments import cells
 from experiments.path_traced.pairs import OUTPUT, RenderedPair, read_pairs
 from experiments.path_traced.real_objects import real_objects
 from experiments.path_traced.sheet import panel, sheet
@@ -84,19 +85,18 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
 
 def table(found: dict[str, dict[str, Any]]) -> str:
     """One line for each group of rows."""
-    lines = [
-        "| told | pairs | `mesh_iou` (mug / bowl / bottle) | height error | width error | centre error | failed |",
-        "|---" * 7 + "|",
-    ]
+    head = (
+        "told", "pairs", "`mesh_iou` (mug / bowl / bottle)", "height error", "width error", "centre error", "failed",
+    )  # fmt: skip
+    rows = []
     for name, values in found.items():
         parts = " / ".join(
             f"{values[key]:.2f}" if (key := f"iou/{category}") in values else "" for category in CATEGORIES
         )
-        errors = " | ".join(f"{1000 * values[column]:.0f} mm" for column in COLUMNS[1:])
-        lines.append(
-            f"| {name} | {values['pairs']} | **{values['iou']:.3f}** ({parts}) | {errors} | {values['failed']} |"
-        )
-    return "\n".join(lines) + "\n"
+        errors = [f"{1000 * values[column]:.0f} mm" for column in COLUMNS[1:]]
+        iou = f"**{values['iou']:.3f}** ({parts})"
+        rows.append([name, str(values["pairs"]), iou, *errors, str(values["failed"])])
+    return cells.table(head, rows) + "\n"
 
 
 def write_rows(path: Path, rows: Sequence[Row]) -> None:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
-from zlib import crc32
 
 import numpy as np
 import torch
@@ -14,6 +13,7 @@ from stereo_occ.config import QueriesConfig
 from stereo_occ.data.augmentation import AugmentationConfig, augmented
 from stereo_occ.data.batch import Batch, ImageTruth, Queries, ViewId
 from stereo_occ.data.controls import ControlConfig, controlled, right_item
+from stereo_occ.data.seeds import object_seed
 from stereo_occ.data.shard import Shard
 from stereo_occ.errors import UserError
 from stereo_occ.models.base import StereoViews
@@ -247,7 +247,7 @@ class EvaluationPairs(PairsDataset):
     def _points(self, item: int) -> dict[str, LabelledPoints]:
         shard, view = self.locate(item)
         pose, pool = shard.pose(view), shard.pool("box")
-        rng = np.random.default_rng([crc32(f"{shard.category}/{shard.object_id}".encode()), view])
+        rng = np.random.default_rng([object_seed(shard.category, shard.object_id), view])
         bbox = pool_queries(pool, pose, self.points, rng)
         cube = cube_queries(pool, pose, self.points, rng)
         return {

@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass
 from enum import Enum
 from functools import cache
 from pathlib import Path
-from zlib import crc32
 
 import numpy as np
 from tqdm import tqdm
@@ -23,6 +22,7 @@ from stereo_occ.data.objects import Objects, ObjectSource, list_objects, members
 from stereo_occ.data.pairs import Stream, render_views
 from stereo_occ.data.processes import start_worker
 from stereo_occ.data.rigs import ToedInRigConfig
+from stereo_occ.data.seeds import object_seed
 from stereo_occ.data.shard import VERSION
 from stereo_occ.data.shard_writing import write_shard
 from stereo_occ.errors import UserError
@@ -109,13 +109,13 @@ def render_object(source: ObjectSource, path: Path, pairs: PairsConfig) -> None:
     """Build, render, label and write one object."""
     data = pairs.data
     shape = source.build()
-    object_seed = [data.seed, crc32(f"{source.category}/{source.object_id}".encode())]
-    points_rng = np.random.default_rng([*object_seed, Stream.POINTS])
+    seed = [data.seed, object_seed(source.category, source.object_id)]
+    points_rng = np.random.default_rng([*seed, Stream.POINTS])
     pools = {
         "box": box_pool(shape, data.pool_size, points_rng),
         "surface": surface_pool(shape, data.pool_size, points_rng),
     }
-    views = render_views(shape, pairs, object_seed, _renderer())
+    views = render_views(shape, pairs, seed, _renderer())
     write_shard(path, shape, views, pools)
 
 
