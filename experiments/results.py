@@ -56,6 +56,14 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
         "reached": partial(run_tables.reached, FREE),
         "over_mono": partial(run_tables.over_mono, FREE, "test", ("iou", "handle_recall")),
         "over_mono_real": partial(run_tables.over_mono, FREE, "real", ("iou",)),
+        "pair": partial(
+            run_tables.less,
+            {
+                "test objects": FREE / "guided_against_its_mono",
+                "real objects": FREE / "guided_against_its_mono_real",
+            },
+            ("iou", "recall_2_visible", "recall_2_occluded"),
+        ),
     },
     "experiments/free_40k/README.md": {
         "reached": partial(run_tables.reached, FREE_WHOLE),

@@ -49,6 +49,8 @@ RUNS = {
     FREE / "stereo": "experiment=recipe placement=free model=stereo steps=10000",
     FREE / "plane_sweep_stereo_aided": f"experiment=recipe placement=free {AIDED} steps=10000",
     FREE / "plane_sweep_guided": f"experiment=recipe placement=free {GUIDED} steps=10000",
+    FREE
+    / "plane_sweep_guided_left": f"experiment=recipe placement=free {GUIDED} model.views=left steps=10000",
     FREE_WHOLE / "mono_scratch": "experiment=recipe placement=free model=mono_scratch scale.batch_size=8",
     FREE_WHOLE / "stereo": "experiment=recipe placement=free model=stereo scale.batch_size=8",
     FREE_WHOLE / "plane_sweep_guided": f"experiment=recipe placement=free {GUIDED} scale.batch_size=8",
