@@ -49,13 +49,15 @@ class Photographs:
 
 
 def reconstructed(reconstruct: Reconstructor, photographs: Photographs, told: Told) -> Reconstruction:
-    """What is measured.
+    """What is measured: one answer, without that for the mirror image.
 
     Raises:
         UserError: nothing is found to be occupied, or the object is not found in the other image.
     """
     left, right = photographs.rgb_2HW3
-    return reconstruct(left, right, photographs.pair, surface=SurfaceOptions(resolution=96), **told)
+    return reconstruct(
+        left, right, photographs.pair, mirror=False, surface=SurfaceOptions(resolution=96), **told
+    )
 
 
 def compared(mesh: Trimesh, photographs: Photographs) -> list[float]:

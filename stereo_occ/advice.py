@@ -47,6 +47,7 @@ def expected_value(node: Node, key: str) -> str | None:
 
 
 def one_line(error: Exception) -> str:
+    """What an error of Hydra or OmegaConf says, without the lines on its own types."""
     lines = [line.strip() for line in str(error.__cause__ or error).splitlines()]
     return "; ".join(
         line for line in lines if line and not line.startswith(("object_type", "reference_type"))

@@ -30,9 +30,19 @@ if [ -n "${REAL:-}" ]; then
     done
     measure photographs "${standing[@]}" data.views=4 rig=zed_mini background=photographs
     before=outputs/field_before/zed_mini_best
-    judge $before checkpoint="${runs}_second/best.ckpt" views=4 data=meshes data.root="$REAL" data.views=4 texture=own rig=zed_mini \
+    judge $before checkpoint="${runs}_second/best.ckpt" views=4 "${standing[@]}" data.views=4 rig=zed_mini \
         lights=room sensor=noisy 'sensor.exposure=[-0.5,1.5]'
     differ zed_mini_against_before "$runs/zed_mini_best" $before
+    # A fourth part, which was not worth keeping.
+    train "${runs}_fourth" steps=6000 init="$runs/best.ckpt" optimizer.lr=5e-4 data.seed=2 \
+        'scale.counts={mug: 900, bowl: 400, bottle: 250}' scale.views=16
+    fourth() { # where, overrides
+        local where=$1; shift
+        judge "${runs}_fourth/${where}_best" checkpoint="${runs}_fourth/best.ckpt" views=4 "${standing[@]}" data.views=4 "$@"
+        differ fourth_part_$where "${runs}_fourth/${where}_best" "$runs/${where}_best"
+    }
+    fourth real
+    fourth zed_mini rig=zed_mini
 fi
 collect "$runs" "$here"
 .venv/bin/python -m stereo_occ.export checkpoint="$runs/best.ckpt" output=stereo_occ/weights/field metrics="$here/test.json"

@@ -70,6 +70,7 @@ def _objects(cfg: DictConfig) -> Iterator[str]:
 
 
 def folder_problems(cfg: DictConfig) -> Iterator[str]:
+    """Of a folder of one's own meshes and the limits on reading them."""
     if not Path(cfg.data.root).is_dir():
         yield f"data.root={cfg.data.root}: no such folder; give the folder of the meshes"
     if not cfg.data.time_limit > 0:

@@ -14,6 +14,7 @@ ACCELERATORS = ("cpu", "gpu", "auto")
 
 
 def control_problems(cfg: DictConfig) -> Iterator[str]:
+    """Of the control that pairs are seen under."""
     name, degrees = cfg.control.name, cfg.control.degrees
     yield from known("control.name", name, CONTROLS)
     if name == "calibration_off" and not 0 < degrees <= 180:
@@ -23,6 +24,7 @@ def control_problems(cfg: DictConfig) -> Iterator[str]:
 
 
 def hardware_problems(cfg: DictConfig) -> Iterator[str]:
+    """Of processors, processes of loaders and precision."""
     trainer = cfg.trainer
     yield from at_least(0, cfg, "trainer.workers")
     yield from beyond_cores("trainer.workers", trainer.workers)

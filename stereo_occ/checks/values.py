@@ -14,23 +14,27 @@ MOST_POINTS = 10_000_000
 
 
 def at_least(minimum: int, cfg: DictConfig, *keys: str) -> Iterator[str]:
+    """The keys whose values are below ``minimum``."""
     for key in keys:
         if value_of(cfg, key) < minimum:
             yield f"{key}={value_of(cfg, key)}: must be at least {minimum}"
 
 
 def at_most(maximum: int, cfg: DictConfig, *keys: str) -> Iterator[str]:
+    """The keys whose values are above ``maximum``."""
     for key in keys:
         if value_of(cfg, key) > maximum:
             yield f"{key}={value_of(cfg, key)}: must be at most {maximum}"
 
 
-def known(key: str, value: str, known: Sequence[str] | dict[str, Any]) -> Iterator[str]:
-    if value not in known:
-        yield f"{key}={value}: unknown; {nearest(value, known)}"
+def known(key: str, value: str, choices: Sequence[str] | dict[str, Any]) -> Iterator[str]:
+    """A value that is none of the choices."""
+    if value not in choices:
+        yield f"{key}={value}: unknown; {nearest(value, choices)}"
 
 
 def refusal(function: Any, *arguments: Any) -> Iterator[str]:
+    """What a function has against its arguments."""
     try:
         function(*arguments)
     except UserError as error:
@@ -38,4 +42,5 @@ def refusal(function: Any, *arguments: Any) -> Iterator[str]:
 
 
 def value_of(cfg: DictConfig, key: str) -> Any:
+    """Of a dotted key."""
     return OmegaConf.select(cfg, key)
